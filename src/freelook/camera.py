@@ -1,0 +1,203 @@
+"""The camera, and THE definition of the projection.
+
+Every renderer in every language does the same few operations with one table:
+
+    p = d.xy / (|d| + d.z)             stereographic coordinate, |p| = tan(theta/2)
+    t = p . p                          = tan^2(theta/2)
+    pixel = center + stretch @ (p * g(t))       g(t) = r(theta) / tan(theta/2)
+
+`d` is a ray in the camera frame, of any length, at any angle from the axis but exactly 180
+degrees. g is tabulated at 256 equally spaced t on [0, t_max] and interpolated linearly. A ray
+with t > t_max is not seen by the lens.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from .errors import ProfileError
+from .lens import Floats, Lens, angle_at_radius, growth_limit, radius_slope
+from .rotations import RDF_FROM_FRD
+
+TABLE_SIZE = 256
+# tan^2(theta/2) grows without bound towards 180 degrees; beyond this the table gets coarse
+# (0.15 px at 160 degrees and f = 300), so nothing is claimed there.
+WIDEST_RAD = np.radians(140.0)
+
+
+@dataclass(frozen=True)
+class RadialTable:
+    """g(t), ready for a renderer: `g` float32 (256,), `t_max`, and what the table costs.
+
+    `residual_px` is the largest distance between table and exact formula over the whole field,
+    measured at the middle of every interval, where linear interpolation is worst.
+    """
+
+    g: NDArray[np.float32]
+    t_max: float
+    residual_px: float
+
+    def __call__(self, t: Floats) -> Floats:
+        """g at `t`, linear between entries; held constant beyond `t_max`."""
+        return np.interp(t, np.linspace(0.0, self.t_max, len(self.g)), self.g)
+
+
+def make_table(lens: Lens, theta_max: float) -> RadialTable:
+    """Tabulate a lens on [0, theta_max] (radians)."""
+    t_max = float(np.tan(theta_max / 2) ** 2)
+    t = np.linspace(0.0, t_max, TABLE_SIZE)
+    g = _exact_g(lens, t, theta_max).astype(np.float32)
+    between = (t[1:] + t[:-1]) / 2
+    table_g = (g[1:].astype(np.float64) + g[:-1]) / 2
+    residual = np.abs(table_g - _exact_g(lens, between, theta_max)) * np.sqrt(between)
+    return RadialTable(g, t_max, float(residual.max()))
+
+
+def _exact_g(lens: Lens, t: Floats, theta_max: float) -> Floats:
+    tangent = np.sqrt(t)
+    theta = np.minimum(2 * np.arctan(tangent), theta_max)
+    on_axis = 2 * radius_slope(lens, np.zeros(1))[0]  # r / tan(theta/2) -> 2 r'(0)
+    return np.divide(
+        lens.radius(theta), tangent, out=np.full_like(t, on_axis), where=tangent > 1e-9
+    )
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A lens on a sensor on a vehicle.
+
+    size            (width, height) of the picture in pixels
+    lens            r(theta) in pixels
+    center          (x, y) of the optical axis; (0, 0) is the middle of the top-left pixel
+    stretch         2x2, from the lens's round image to the sensor: pixel aspect, sensor tilt
+    theta_max       half of the field the lens is good for, radians
+    camera_from_body  how the camera is mounted; default: looks straight forward
+    """
+
+    size: tuple[int, int]
+    lens: Lens
+    center: tuple[float, float]
+    theta_max: float
+    stretch: NDArray[np.float64] = field(default_factory=lambda: np.eye(2))
+    camera_from_body: Rotation = RDF_FROM_FRD
+
+    @cached_property
+    def table(self) -> RadialTable:
+        return make_table(self.lens, self.theta_max)
+
+    def project(self, ray_in_camera: Floats) -> Floats:
+        """Rays (..., 3) of any length to pixels (..., 2), exactly; NaN where not seen.
+
+        NaN too for the zero vector. This is the float64 reference; renderers use `table`.
+        """
+        xy, theta, sine = _polar(ray_in_camera)
+        seen = theta <= self.theta_max
+        radius = self.lens.radius(np.where(seen, theta, 0.0))
+        scale = np.divide(radius, sine, out=np.zeros_like(sine), where=sine > 0)
+        pixel = np.asarray(self.center) + (xy * scale[..., None]) @ self.stretch.T
+        pixel[~seen] = np.nan
+        return np.asarray(pixel)
+
+    def ray(self, pixel: Floats) -> Floats:
+        """Pixels (..., 2) to unit rays in the camera frame (..., 3); NaN outside the field."""
+        offset = (np.asarray(pixel, dtype=np.float64) - self.center) @ np.linalg.inv(self.stretch).T
+        radius = np.hypot(offset[..., 0], offset[..., 1])
+        theta = np.asarray(angle_at_radius(self.lens, radius, self.theta_max))
+        sine = np.divide(np.sin(theta), radius, out=np.zeros_like(radius), where=radius > 0)
+        return np.concatenate([offset * sine[..., None], np.cos(theta)[..., None]], axis=-1)
+
+    def resized(self, size: tuple[int, int]) -> Camera:
+        """The same camera delivering its whole picture at another size."""
+        scale = np.array(size) / np.array(self.size)
+        center = (np.array(self.center) + 0.5) * scale - 0.5
+        return Camera(
+            size,
+            self.lens,
+            (float(center[0]), float(center[1])),
+            self.theta_max,
+            np.diag(scale) @ self.stretch,
+            self.camera_from_body,
+        )
+
+
+def _polar(ray: Floats) -> tuple[Floats, Floats, Floats]:
+    """(xy of the unit ray, angle from the axis, sine of it); NaN angle for a zero ray."""
+    ray = np.asarray(ray, dtype=np.float64)
+    length = np.linalg.norm(ray, axis=-1, keepdims=True)
+    unit = np.divide(ray, length, out=np.full_like(ray, np.nan), where=length > 0)
+    sine = np.hypot(unit[..., 0], unit[..., 1])
+    return unit[..., :2], np.arctan2(sine, unit[..., 2]), sine
+
+
+def make_camera(
+    size: tuple[int, int],
+    lens: Lens,
+    *,
+    center: tuple[float, float] | None = None,
+    field_deg: float | None = None,
+    stretch: NDArray[np.float64] | None = None,
+    camera_from_body: Rotation = RDF_FROM_FRD,
+) -> Camera:
+    """A camera with the usual defaults, checked.
+
+    `center` defaults to the middle of the picture. `field_deg` is the full field of view the
+    lens is claimed to be good for; when None it ends where the radius stops growing or at the
+    farthest corner of the picture, whichever comes first. ProfileError says where a radius
+    stops growing inside a claimed field.
+    """
+    width, height = size
+    center = ((width - 1) / 2, (height - 1) / 2) if center is None else center
+    stretch = np.eye(2) if stretch is None else np.asarray(stretch, dtype=np.float64)
+    if width < 1 or height < 1:
+        raise ProfileError(f"size must be at least 1 x 1 pixels, not {width} x {height}")
+    if abs(np.linalg.det(stretch)) < 1e-6:
+        raise ProfileError(f"stretch {stretch.tolist()} flattens the picture to a line")
+    limit = growth_limit(lens)
+    if limit <= 0:
+        raise ProfileError(f"{lens}: the radius does not grow with the angle, not even on the axis")
+    theta_max = (
+        _corner_angle(size, lens, center, stretch, limit)
+        if field_deg is None
+        else _claimed_angle(lens, field_deg, limit)
+    )
+    return Camera(size, lens, center, theta_max, stretch, camera_from_body)
+
+
+def _claimed_angle(lens: Lens, field_deg: float, limit: float) -> float:
+    half = np.radians(field_deg) / 2
+    if not 0 < half <= WIDEST_RAD:
+        widest = 2 * np.degrees(WIDEST_RAD)
+        raise ProfileError(f"field_deg must lie above 0 and up to {widest:.0f}, not {field_deg}")
+    if half > limit + 1e-9:
+        raise ProfileError(
+            f"the radius of this {type(lens).__name__} lens stops growing at "
+            f"{np.degrees(limit):.2f} degrees from the axis, inside the claimed field of "
+            f"{field_deg} degrees (half: {field_deg / 2}); claim at most "
+            f"field_deg = {2 * np.degrees(limit):.1f}, or check the parameters"
+        )
+    return _below_pole(lens, min(half, limit))
+
+
+def _below_pole(lens: Lens, theta: float) -> float:
+    """Keep a hair away from an angle where the formula is infinite (tan at 90 degrees)."""
+    return min(theta, lens.hard_limit - 1e-3) if lens.hard_limit < np.pi else theta
+
+
+def _corner_angle(
+    size: tuple[int, int],
+    lens: Lens,
+    center: tuple[float, float],
+    stretch: NDArray[np.float64],
+    limit: float,
+) -> float:
+    corners = np.array([[x, y] for x in (-0.5, size[0] - 0.5) for y in (-0.5, size[1] - 0.5)])
+    offset = (corners - center) @ np.linalg.inv(stretch).T
+    farthest = float(np.hypot(offset[:, 0], offset[:, 1]).max())
+    limit = _below_pole(lens, min(limit, WIDEST_RAD))
+    angle = angle_at_radius(lens, np.array([farthest]), limit)[0]
+    return limit if np.isnan(angle) else float(angle)
