@@ -1,0 +1,72 @@
+"""The command line: `freelook COMMAND`. One file per command.
+
+A command module has a one-line docstring (its help), `add_arguments(parser)` and
+`run(args) -> int`, the exit status. Only this layer prints or exits.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+
+from .. import __version__
+from ..errors import FreelookError, MissingExtra
+
+COMMANDS = ("demo", "fly", "render", "simulate", "bench", "doctor")
+
+EXTRA_OF = {
+    "aiohttp": "web",
+    "aiortc": "web",
+    "aiortsp": "rtsp",
+    "av": "video",
+    "cryptography": "web",
+    "cv2": "render",
+    "numba": "render",
+    "playwright": "dev",
+    "rich": "cli",
+}
+
+
+def make_parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="freelook",
+        description="A gimbal with no moving parts: look around in a live fisheye video.",
+        epilog="Try 'freelook demo' first, or 'freelook COMMAND --help'.",
+    )
+    parser.add_argument("--version", action="version", version=f"freelook {__version__}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    for name in COMMANDS:
+        module = import_module(f".{name}", __name__)
+        assert module.__doc__
+        summary = module.__doc__.strip().splitlines()[0]
+        command = commands.add_parser(
+            name,
+            help=summary,
+            description=module.__doc__,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        module.add_arguments(command)
+        command.set_defaults(run=module.run)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; errors made on purpose become one line and exit status 2."""
+    args = make_parser().parse_args(arguments)
+    try:
+        return int(args.run(args))
+    except ModuleNotFoundError as error:
+        if error.name not in EXTRA_OF:
+            raise
+        return _fail(args.command, MissingExtra(error.name, EXTRA_OF[error.name]))
+    except FreelookError as error:
+        return _fail(args.command, error)
+    except KeyboardInterrupt:
+        return 130
+
+
+def _fail(command: str, error: FreelookError) -> int:
+    print(f"freelook {command}: {error}", file=sys.stderr)
+    return 2

@@ -1,0 +1,1 @@
+"""Coded video: depacketising, decoding, encoding. Knows codecs, not networks."""
