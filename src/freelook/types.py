@@ -126,10 +126,14 @@ class Tracker(Protocol):
     """Something that knows where a head looks.
 
     `poses` blocks and yields the newest pose each time there is one, and ends after `close`
-    (which may be called from any thread). Bad input is counted, never raised.
+    (which may be called from any thread). Bad input is counted, never raised. `message` says
+    what it is waiting for, to be shown while no pose comes.
     """
 
     counters: Counters
+
+    @property
+    def message(self) -> str: ...
 
     def poses(self) -> Iterator[Pose]: ...
 
