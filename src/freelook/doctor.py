@@ -1,0 +1,261 @@
+"""What works on this machine, and what to do about what does not.
+
+Each check is a function that returns `Check` lines; `CHECKS` names them in the order in which
+they are shown. Facts are passed in where that makes a check testable.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import platform
+import re
+import shutil
+import socket
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from importlib import import_module, metadata
+from pathlib import Path
+from typing import Literal
+
+from . import __version__
+from .egl import renderer_name
+
+State = Literal["ok", "warn", "no"]
+
+# what freelook cannot fly without; the other extras add to it
+ESSENTIAL_EXTRAS = ("render", "video", "web")
+EXTRAS = (*ESSENTIAL_EXTRAS, "rtsp", "cli")
+HARDWARE_ENCODERS = ("h264_nvenc", "h264_vaapi", "h264_qsv", "h264_amf", "h264_videotoolbox")
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "firefox", "microsoft-edge")
+PORTS = (
+    ("tcp", 8080, "the page", "choose another: freelook fly --port N"),
+    ("udp", 4242, "OpenTrack", "close the other receiver, or use another port in both programs"),
+    ("udp", 5004, "RTP video", "close the other receiver, or send to another port"),
+)
+# a key frame of a 4K stream arrives as a burst of about this many bytes
+BURST_BYTES = 2_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One line: `state` of `name`, `what` was found, and `todo` about it where there is any."""
+
+    name: str
+    state: State
+    what: str
+    todo: str = ""
+    essential: bool = False
+
+
+def examine() -> Iterator[Check]:
+    """All lines, one after the other. A check that fails by itself is a line too."""
+    for check in CHECKS:
+        try:
+            yield from check()
+        except Exception as error:
+            name = check.__name__.removeprefix("check_")
+            yield Check(name, "warn", f"could not be examined: {type(error).__name__}: {error}")
+
+
+def fit_to_fly(checks: Iterable[Check]) -> bool:
+    """False when something essential is missing."""
+    return not any(check.essential and check.state == "no" for check in checks)
+
+
+def check_python() -> Iterator[Check]:
+    where = f"{platform.system()} {platform.machine()}"
+    yield Check("python", "ok", f"Python {platform.python_version()}, {where}")
+    yield Check("freelook", "ok", f"freelook {__version__}")
+
+
+def check_libraries() -> Iterator[Check]:
+    requirements = metadata.requires("freelook") or []
+    for extra in EXTRAS:
+        yield libraries_line(extra, names_in_extra(requirements, extra), installed_version)
+
+
+def names_in_extra(requirements: Iterable[str], extra: str) -> list[str]:
+    """Names of the distributions that a package's metadata lists for one of its extras."""
+    mark = re.compile(rf"""extra == ['"]{extra}['"]""")
+    return [re.split(r"[^\w.-]", text, maxsplit=1)[0] for text in requirements if mark.search(text)]
+
+
+def installed_version(name: str) -> str | None:
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return None
+
+
+def libraries_line(extra: str, names: list[str], version: Callable[[str], str | None]) -> Check:
+    versions = {name: version(name) for name in names}
+    missing = [name for name, found in versions.items() if found is None]
+    if missing:
+        return Check(
+            f"extra '{extra}'",
+            "no",
+            f"not installed: {', '.join(missing)}",
+            f"pip install 'freelook[{extra}]'",
+            essential=extra in ESSENTIAL_EXTRAS,
+        )
+    return Check(f"extra '{extra}'", "ok", ", ".join(f"{n} {v}" for n, v in versions.items()))
+
+
+def check_codecs() -> Iterator[Check]:
+    for name, mode, use in (
+        ("h264", "r", "decode H.264"),
+        ("hevc", "r", "decode H.265"),
+        ("mjpeg", "r", "decode MJPEG"),
+        ("libx264", "w", "encode H.264"),
+        ("libx265", "w", "encode H.265"),
+    ):
+        found = _has_codec(name, mode)
+        todo = "" if found else "install PyAV's own wheels: pip install --force-reinstall av"
+        needed = "264" in name
+        yield Check(use, "ok" if found else "no", f"FFmpeg's {name}", todo, essential=needed)
+    opened = [name for name in HARDWARE_ENCODERS if _opens(name)]
+    found_text = ", ".join(opened) if opened else "none opens here"
+    yield Check("hardware encoders", "ok", f"{found_text} (not used today; x264 is)")
+
+
+def _has_codec(name: str, mode: str) -> bool:
+    av = import_module("av")
+    try:
+        av.codec.Codec(name, mode)
+    except ValueError:
+        return False
+    return True
+
+
+def _opens(encoder: str) -> bool:
+    """Whether it really encodes here: many are compiled in and find no hardware."""
+    av = import_module("av")
+    try:
+        context = av.CodecContext.create(encoder, "w")
+        context.width, context.height, context.framerate = 320, 240, 30
+        context.pix_fmt = context.codec.video_formats[0].name
+        context.open()
+    except (ValueError, TypeError, av.FFmpegError):
+        return False
+    return True
+
+
+def check_graphics() -> Iterator[Check]:
+    name = renderer_name()
+    what = f"OpenGL by {name}" if name else "no OpenGL without a window"
+    yield Check("graphics", "ok", f"{what} (not needed: files are rendered on the CPU)")
+
+
+def check_processor() -> Iterator[Check]:
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    threads = import_module("cv2").getNumThreads()
+    numba_threads = import_module("numba").config.NUMBA_NUM_THREADS
+    what = f"{cores} cores; OpenCV uses {threads} threads, Numba {numba_threads}"
+    if (cores or 1) < 2:
+        yield Check("processor", "warn", what, "decoding and rendering want 2 cores or more")
+    else:
+        yield Check("processor", "ok", what)
+
+
+def check_cameras() -> Iterator[Check]:
+    yield from camera_lines(Path("/dev"), Path("/sys/class/video4linux"))
+
+
+def camera_lines(devices: Path, names: Path) -> Iterator[Check]:
+    """One line for each /dev/video*, or one that says there is none."""
+    found = sorted(devices.glob("video[0-9]*"))
+    if not found:
+        yield Check(
+            "cameras", "warn", "none at /dev/video*", "plug one in, or fly a stream or file"
+        )
+    for device in found:
+        label = names / device.name / "name"
+        name = label.read_text(errors="replace").strip() if label.is_file() else "unnamed"
+        if os.access(device, os.R_OK | os.W_OK):
+            yield Check("camera", "ok", f"{device} {name}")
+        else:
+            todo = 'sudo usermod -aG video "$USER", then log in again'
+            yield Check("camera", "no", f"{device} {name}: no permission to open it", todo)
+
+
+def check_ports() -> Iterator[Check]:
+    for kind, port, use, todo in PORTS:
+        where = f"{kind} port {port} ({use})"
+        if port_free(kind, port):
+            yield Check("port", "ok", f"{where} is free")
+        else:
+            yield Check("port", "warn", f"{where} is in use", todo)
+
+
+def port_free(kind: str, port: int) -> bool:
+    stream = kind == "tcp"
+    with socket.socket(type=socket.SOCK_STREAM if stream else socket.SOCK_DGRAM) as probe:
+        if stream:  # as servers do: a port that was closed a moment ago is free
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(("", port))
+        except OSError:
+            return False
+    return True
+
+
+def check_udp_buffer() -> Iterator[Check]:
+    with contextlib.suppress(FileNotFoundError):  # not Linux: nothing to say
+        text = Path("/proc/sys/net/core/rmem_max").read_text()
+        yield buffer_line(int(text))
+
+
+def buffer_line(limit_bytes: int) -> Check:
+    what = f"receive buffers up to {limit_bytes / 1e6:.1f} MB"
+    if limit_bytes >= BURST_BYTES:
+        return Check("UDP", "ok", what)
+    todo = f"against losses in large key frames: sudo sysctl -w net.core.rmem_max={2 * BURST_BYTES}"
+    return Check("UDP", "warn", what, todo)
+
+
+def check_browser() -> Iterator[Check]:
+    found = [name for name in BROWSERS if shutil.which(name)]
+    if found or platform.system() in ("Darwin", "Windows"):  # which come with one
+        yield Check("browser", "ok", f"{found[0] if found else 'the system has one'}")
+    else:
+        todo = "open the page's address on another machine or a phone"
+        yield Check("browser", "warn", "none on this machine", todo)
+    yield Check(
+        "browser codecs",
+        "ok",
+        "H.264 goes to browsers untouched; H.265 is transcoded, as few take it by WebRTC",
+    )
+
+
+def check_network() -> Iterator[Check]:
+    address = outward_address()
+    if address is None:
+        yield Check("network", "warn", "no network but this machine itself", "connect for phones")
+        return
+    todo = "for a phone: freelook fly --host 0.0.0.0 --tls (its motion sensors want https)"
+    yield Check("network", "ok", f"this machine is {address}", todo)
+
+
+def outward_address() -> str | None:
+    """This machine's address on its network. Nothing is sent: UDP only looks up the route."""
+    with socket.socket(type=socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect(("192.0.2.1", 9))  # an address reserved for documentation
+        except OSError:
+            return None
+        return str(probe.getsockname()[0])
+
+
+CHECKS: tuple[Callable[[], Iterator[Check]], ...] = (
+    check_python,
+    check_libraries,
+    check_codecs,
+    check_graphics,
+    check_processor,
+    check_cameras,
+    check_ports,
+    check_udp_buffer,
+    check_browser,
+    check_network,
+)
