@@ -1,0 +1,1 @@
+"""The station's web server: page, WHEP, and what travels beside the video."""

@@ -1,0 +1,114 @@
+"""The JSON messages between page and station, on the data channel "head"."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from typing import Any
+
+from ..camera import Camera
+from ..gimbal import Aim
+from ..head import HeadStatus
+from ..rotations import FRD_FROM_RDF, RDF_FROM_FRD, to_wxyz
+from ..types import Counters
+
+LONGEST_MESSAGE = 1000
+NS_PER_MS = 1e6
+
+
+def read_ping(message: object) -> float | None:
+    """The time in a ping; None for anything else a page, or somebody else, may send."""
+    if not isinstance(message, str) or len(message) > LONGEST_MESSAGE:
+        return None
+    try:
+        data = json.loads(message)
+    except (ValueError, RecursionError):
+        return None
+    if not isinstance(data, dict) or data.get("type") != "ping":
+        return None
+    time_ms = data.get("t")
+    if isinstance(time_ms, bool) or not isinstance(time_ms, (int, float)):
+        return None
+    return time_ms if abs(time_ms) < 1e15 else None
+
+
+def pong(time_ms: float, now_ns: int) -> str:
+    return text({"type": "pong", "t": time_ms, "ns": now_ns})
+
+
+def pose(tracker: str, aim: Aim, now_ns: int) -> str:
+    """Where a head looks, as head_from_view; (1, 0, 0, 0) is straight ahead."""
+    return text(
+        {
+            "type": "pose",
+            "tracker": tracker,
+            "q": to_wxyz(RDF_FROM_FRD * aim.body_from_view),
+            "state": aim.state,
+            "t": aim.pose_ns,
+            "sent": now_ns,
+        }
+    )
+
+
+def frame(rtp: int, capture_ns: int) -> str:
+    return text({"type": "frame", "rtp": rtp, "arrival": capture_ns})
+
+
+def status(source: dict[str, Any], trackers: Iterable[HeadStatus], viewers: int) -> dict[str, Any]:
+    return {
+        "type": "status",
+        "source": source,
+        "trackers": [_tracker(tracker) for tracker in trackers],
+        "viewers": viewers,
+    }
+
+
+def source_status(
+    ingest: Any, why_transcode: str | None, message: str | None, extra: dict[str, int]
+) -> dict[str, Any]:
+    stream = ingest.stream
+    return {
+        "state": ingest.state,
+        "message": ingest.message or message,
+        "age_ms": milliseconds(ingest.age_ns),
+        "codec": stream.codec if stream else None,
+        "size": [stream.width, stream.height] if stream and stream.width else None,
+        "transcoding": why_transcode,
+        "counters": counts(ingest.counters) | extra,
+    }
+
+
+def camera_table(camera: Camera) -> dict[str, Any]:
+    """What the page's shader needs of a camera; rays come in head-neutral axes (RDF)."""
+    return {
+        "size": list(camera.size),
+        "center": list(camera.center),
+        "stretch": camera.stretch.tolist(),
+        "t_max": camera.table.t_max,
+        "g": [float(value) for value in camera.table.g],
+        "camera_from_head": (camera.camera_from_body * FRD_FROM_RDF).as_matrix().tolist(),
+    }
+
+
+def milliseconds(nanoseconds: int | None) -> float | None:
+    return None if nanoseconds is None else round(nanoseconds / NS_PER_MS, 1)
+
+
+def counts(counters: Counters) -> dict[str, int]:
+    """A copy of counters that other threads go on counting in."""
+    return dict(counters.values)
+
+
+def _tracker(head: HeadStatus) -> dict[str, Any]:
+    return {
+        "name": head.name,
+        "state": head.state,
+        "message": head.message,
+        "age_ms": milliseconds(head.age_ns),
+        "rate_hz": round(head.rate_hz, 1),
+        "counters": head.counters,
+    }
+
+
+def text(message: dict[str, Any]) -> str:
+    return json.dumps(message, separators=(",", ":"), allow_nan=False)

@@ -1,0 +1,198 @@
+"""The station: one camera, any number of heads, any number of viewers.
+
+Everything here runs on the event loop, except where it says otherwise.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from .. import __version__
+from ..camera import Camera
+from ..clock import Clock, now_ns
+from ..head import Head
+from ..types import Counters
+from . import messages
+from .feed import Feed, Ingest
+from .units import Hub
+from .whep import Viewer, Viewers
+
+TICK_S = 1 / 30
+TICKS_PER_STATUS = 7
+ACTIONS = ("recentre", "enable", "disable")
+
+
+@dataclass(frozen=True)
+class About:
+    """What the page is told once."""
+
+    source: str
+    demo: bool = False
+    hold_s: float = 1.0
+    ease_s: float = 2.0
+    hfov_deg: float = 90.0
+
+
+class UnknownName(LookupError):  # noqa: N818 - an answer, not a failure
+    """A tracker or an action that does not exist; says which do."""
+
+
+class Station:
+    """Wires ingest, heads and viewers together. `start` and `close` once each."""
+
+    def __init__(
+        self,
+        ingest: Ingest,
+        camera: Camera,
+        heads: Mapping[str, Head],
+        about: About,
+        *,
+        most_viewers: int = 16,
+        clock: Clock = now_ns,
+    ) -> None:
+        self.counters = Counters()
+        self.viewers: Viewers
+        self._ingest = ingest
+        self._camera = camera
+        self._heads = dict(heads)
+        self._about = about
+        self._most_viewers = most_viewers
+        self._clock = clock
+        self._pose_pending = dict.fromkeys(self._heads, False)
+        self._states: dict[str, str] = {}
+
+    async def start(self) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._hub = Hub(self._loop)
+        self._feed = Feed(self._ingest, self._hub)
+        self.viewers = Viewers(
+            self._hub, self, self._most_viewers, lambda count: self._feed.want(count > 0)
+        )
+        self._feed.start()
+        self._ingest.start()
+        for name, head in self._heads.items():
+            head.start(lambda name=name: self._pose_arrived(name))
+        self._ticker = asyncio.create_task(self._tick())
+
+    async def close(self) -> None:
+        self._ticker.cancel()
+        await self.viewers.close()
+        self._feed.close()
+        for head in self._heads.values():
+            await asyncio.to_thread(head.close)
+        await asyncio.to_thread(self._ingest.close)
+
+    def describe(self) -> dict[str, Any]:
+        """GET /api/station."""
+        return {
+            "version": __version__,
+            "source": self._about.source,
+            "demo": self._about.demo,
+            "camera": messages.camera_table(self._camera),
+            "trackers": list(self._heads),
+            "hold_s": self._about.hold_s,
+            "ease_s": self._about.ease_s,
+            "hfov_deg": self._about.hfov_deg,
+        }
+
+    def control(self, tracker: str, action: str) -> None:
+        """Recentre, enable or disable a tracker; UnknownName lists what there is."""
+        if action not in ACTIONS:
+            raise UnknownName(f"unknown action {action!r}; known: {', '.join(ACTIONS)}")
+        if tracker not in self._heads:
+            known = ", ".join(self._heads) or "none"
+            raise UnknownName(f"unknown tracker {tracker!r}; known: {known}")
+        getattr(self._heads[tracker], action)(self._clock())
+        self._push_pose(tracker)
+
+    def status(self) -> dict[str, Any]:
+        """The message of the 4 Hz status, as data."""
+        now = self._clock()
+        ingest = self._ingest.status(now)
+        trouble = self._feed.error or wrong_shape(self._camera.size, ingest.stream)
+        counters = messages.counts(self._hub.counters) | messages.counts(self._feed.counters)
+        source = messages.source_status(ingest, self._feed.why, trouble, counters)
+        trackers = [head.status(now) for head in self._heads.values()]
+        return messages.status(source, trackers, len(self.viewers))
+
+    # --- what viewers tell us
+
+    def opened(self, viewer: Viewer) -> None:
+        for name in self._heads:
+            viewer.send(self._pose_message(name))
+        viewer.send(messages.text(self.status()))
+
+    def heard(self, viewer: Viewer, message: object) -> None:
+        time_ms = messages.read_ping(message)
+        if time_ms is None:
+            viewer.counters.add("messages_not_understood")
+        else:
+            viewer.send(messages.pong(time_ms, self._clock()))
+
+    def frame_sent(self, viewer: Viewer, rtp: int, capture_ns: int) -> None:
+        viewer.send(messages.frame(rtp, capture_ns))
+
+    def wants_key(self, viewer: Viewer) -> bool:
+        return self._feed.request_key()
+
+    def gone(self, viewer: Viewer) -> None:
+        self.viewers.forget(viewer)
+
+    # --- heads
+
+    def _pose_arrived(self, name: str) -> None:
+        """On the tracker's thread. Poses that come faster than the loop turns become one."""
+        if self._pose_pending[name]:
+            return
+        self._pose_pending[name] = True
+        with contextlib.suppress(RuntimeError):  # the loop is closed: nobody is left to tell
+            self._loop.call_soon_threadsafe(self._push_pose, name)
+
+    def _push_pose(self, name: str) -> None:
+        self._pose_pending[name] = False
+        if len(self.viewers):
+            self._send_all(self._pose_message(name))
+
+    def _send_all(self, message: str) -> None:
+        for viewer in self.viewers:
+            viewer.send(message)
+
+    def _pose_message(self, name: str) -> str:
+        now = self._clock()
+        aim = self._heads[name].aim(now)
+        self._states[name] = aim.state
+        return messages.pose(name, aim, now)
+
+    async def _tick(self) -> None:
+        ticks = 0
+        while True:
+            await asyncio.sleep(TICK_S)
+            ticks += 1
+            if not len(self.viewers):
+                continue
+            for name, head in self._heads.items():
+                aim = head.aim(self._clock())
+                if aim.moving or aim.state == "holding" or aim.state != self._states.get(name):
+                    self._push_pose(name)
+            if ticks % TICKS_PER_STATUS == 0:
+                self._send_all(messages.text(self.status()))
+
+
+def wrong_shape(profile: tuple[int, int], stream: Any) -> str | None:
+    """Why this lens profile cannot be right for this video; None when it can, or nobody knows.
+
+    Another size of the same shape is fine: the picture is scaled.
+    """
+    if stream is None or not stream.width or not stream.height:
+        return None
+    width, height = profile
+    if abs(width * stream.height - height * stream.width) <= max(width, height):
+        return None
+    return (
+        f"the video is {stream.width} x {stream.height} pixels, but the lens profile is for "
+        f"{width} x {height}, which has another shape; use the profile of this camera mode"
+    )
