@@ -28,6 +28,7 @@ TABLE_SIZE = 256
 # tan^2(theta/2) grows without bound towards 180 degrees; beyond this the table gets coarse
 # (0.15 px at 160 degrees and f = 300), so nothing is claimed there.
 WIDEST_RAD = np.radians(140.0)
+NARROWEST_RAD = np.radians(0.5)
 
 
 @dataclass(frozen=True)
@@ -165,14 +166,19 @@ def make_camera(
         if field_deg is None
         else _claimed_angle(lens, field_deg, limit)
     )
+    rim = float(lens.radius(np.array([theta_max]))[0])
+    if rim < 1:
+        raise ProfileError(
+            f"{lens}: the whole image has a radius of {rim:.3g} pixels; parameters are in pixels"
+        )
     return Camera(size, lens, center, theta_max, stretch, camera_from_body)
 
 
 def _claimed_angle(lens: Lens, field_deg: float, limit: float) -> float:
     half = np.radians(field_deg) / 2
-    if not 0 < half <= WIDEST_RAD:
-        widest = 2 * np.degrees(WIDEST_RAD)
-        raise ProfileError(f"field_deg must lie above 0 and up to {widest:.0f}, not {field_deg}")
+    if not NARROWEST_RAD <= half <= WIDEST_RAD:
+        narrowest, widest = 2 * np.degrees(NARROWEST_RAD), 2 * np.degrees(WIDEST_RAD)
+        raise ProfileError(f"field_deg must be {narrowest:.0f} to {widest:.0f}, not {field_deg}")
     if half > limit + 1e-9:
         raise ProfileError(
             f"the radius of this {type(lens).__name__} lens stops growing at "

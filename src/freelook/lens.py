@@ -186,8 +186,9 @@ def growth_limit(lens: Lens, up_to: float | None = None) -> float:
 def angle_at_radius(lens: Lens, radius_px: Floats, theta_max: float) -> Floats:
     """The inverse of `lens.radius` on [0, theta_max], in radians; NaN beyond r(theta_max).
 
-    Bracketed on a grid and refined by secant steps: a round trip closes to 1e-9 px, except at a
-    rim where the radius stops growing, where no inverse can.
+    Bracketed on a grid and refined by secant steps: a round trip closes to 1e-8 px, except at a
+    rim where the radius stops growing, where no inverse can, and in the last degree before one
+    where it is infinite.
     """
     grid = np.linspace(0.0, theta_max, 2049)
     grid_radius = lens.radius(grid)
