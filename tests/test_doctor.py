@@ -94,7 +94,7 @@ def test_port_that_is_taken_is_not_free(kind: str, type_: str) -> None:
 def test_small_udp_buffer_says_how_to_raise_it() -> None:
     line = doctor.buffer_line(212_992)
     assert line.state == "warn"
-    assert "sysctl -w net.core.rmem_max=4000000" in line.todo
+    assert "sysctl -w net.core.rmem_max=8388608" in line.todo
     assert doctor.buffer_line(4_000_000).state == "ok"
 
 

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Literal
 
 from . import __version__
+from .datagrams import BUFFER_BYTES
 from .egl import renderer_name
 
 State = Literal["ok", "warn", "no"]
@@ -33,7 +34,7 @@ PORTS = (
     ("udp", 4242, "OpenTrack", "close the other receiver, or use another port in both programs"),
     ("udp", 5004, "RTP video", "close the other receiver, or send to another port"),
 )
-# a key frame of a 4K stream arrives as a burst of about this many bytes
+# a key frame of a 4K stream may arrive as a burst of so many bytes
 BURST_BYTES = 2_000_000
 
 
@@ -210,7 +211,7 @@ def buffer_line(limit_bytes: int) -> Check:
     what = f"receive buffers up to {limit_bytes / 1e6:.1f} MB"
     if limit_bytes >= BURST_BYTES:
         return Check("UDP", "ok", what)
-    todo = f"against losses in large key frames: sudo sysctl -w net.core.rmem_max={2 * BURST_BYTES}"
+    todo = f"against losses in large key frames: sudo sysctl -w net.core.rmem_max={BUFFER_BYTES}"
     return Check("UDP", "warn", what, todo)
 
 
