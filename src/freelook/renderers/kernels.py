@@ -1,0 +1,170 @@
+"""The compiled loops of the CPU renderer: the shared projection (see `freelook.camera`)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+F32 = NDArray[np.float32]
+FAR = np.float32(4.0)  # rays are followed to this many times t_max, then held: all black anyway
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def project_nodes(
+    nodes: F32,
+    step: int,
+    size: tuple[int, int],
+    focal_px: float,
+    camera_from_view: F32,
+    g: F32,
+    t_max: float,
+    center: F32,
+    stretch: F32,
+) -> None:
+    """Fill nodes (3, rows, columns) with pixel x, pixel y and t.
+
+    Node (j, i) stands at view pixel x = step * (i - 1), y = step * (j - 1): one ring
+    of nodes more than the view, for cubic interpolation.
+    """
+    f32 = np.float32
+    cx, cy, focal = f32((size[0] - 1) / 2), f32((size[1] - 1) / 2), f32(focal_px)
+    r = camera_from_view
+    last = f32(len(g) - 1)
+    far = FAR * t_max
+    for row in range(nodes.shape[1]):
+        y = (f32((row - 1) * step) - cy) / focal
+        for column in range(nodes.shape[2]):
+            x = (f32((column - 1) * step) - cx) / focal
+            dx = r[0, 0] * x + r[0, 1] * y + r[0, 2]
+            dy = r[1, 0] * x + r[1, 1] * y + r[1, 2]
+            dz = r[2, 0] * x + r[2, 1] * y + r[2, 2]
+            length = np.sqrt(dx * dx + dy * dy + dz * dz)
+            inverse = f32(1) / max(length + dz, f32(1e-6) * length)
+            px, py = dx * inverse, dy * inverse
+            t = px * px + py * py
+            if t > far:
+                shrink = np.sqrt(far / t)
+                px, py, t = px * shrink, py * shrink, far
+            gain = look_up(g, t / t_max * last)
+            px, py = px * gain, py * gain
+            nodes[0, row, column] = center[0] + stretch[0, 0] * px + stretch[0, 1] * py
+            nodes[1, row, column] = center[1] + stretch[1, 0] * px + stretch[1, 1] * py
+            nodes[2, row, column] = t
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True, inline="always")
+def look_up(g: F32, at: Any) -> Any:
+    """The table at a fractional index; beyond its end it goes on as a parabola.
+
+    Out there all is black, but a kink would spoil the interpolation next to the rim.
+    """
+    last = len(g) - 1
+    if at < last:
+        entry = int(at)
+        return g[entry] + (g[entry + 1] - g[entry]) * (at - entry)
+    bend = g[last] - 2 * g[last - 1] + g[last - 2]
+    beyond = at - last
+    return g[last] + beyond * (g[last] - g[last - 1] + bend / 2 + bend * beyond / 2)
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def interpolation_error(nodes: F32, t_max: float) -> float:
+    """How far cubic interpolation between nodes strays, in pixels, where the lens sees.
+
+    In the middle of four equally spaced nodes a smooth function strays from their cubic by
+    3/128 of its fourth difference; both directions add up.
+    """
+    worst = np.float32(0.0)
+    for row in range(2, nodes.shape[1] - 2):
+        for column in range(2, nodes.shape[2] - 2):
+            if nodes[2, row, column] <= t_max:
+                for k in range(2):
+                    n = nodes[k]
+                    across = n[row, column - 2] - 4 * n[row, column - 1] + 6 * n[row, column]
+                    across += n[row, column + 2] - 4 * n[row, column + 1]
+                    down = n[row - 2, column] - 4 * n[row - 1, column] + 6 * n[row, column]
+                    down += n[row + 2, column] - 4 * n[row + 1, column]
+                    worst = max(worst, abs(across) + abs(down))
+    return float(worst) * 3 / 128
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def expand(nodes: F32, first_row: int, step: int, scale: int, maps: F32) -> None:
+    """Coordinates for a band of rows of a plane `scale` times smaller than luma.
+
+    nodes (3, ...) as from `project_nodes`; `first_row` is the band's first view row, a multiple
+    of `step`, itself a multiple of `scale`. maps (2 or 3, rows, columns) gets x and y in pixels
+    of the smaller plane, and t, at the middle of each plane pixel.
+
+    Along the rows of nodes first, then down between them: the long inner loops run over
+    contiguous memory.
+    """
+    first_cell = first_row // step
+    per_cell = step // scale
+    cells = (maps.shape[1] - 1) // per_cell + 1
+    shift = np.float32((scale - 1) / 2 / step)
+    wide = np.empty((cells + 3, maps.shape[2]), np.float32)
+    for k in range(len(maps)):
+        gain = np.float32(1 / scale) if k < 2 else np.float32(1)
+        offset = np.float32((1 - scale) / 2 / scale) if k < 2 else np.float32(0)
+        for j in range(cells + 3):
+            widen(nodes[k, first_cell + j], step, scale, gain, offset, wide[j])
+        for cell in range(cells):
+            a, b, c, d = wide[cell], wide[cell + 1], wide[cell + 2], wide[cell + 3]
+            first = cell * per_cell
+            for row in range(first, min(first + per_cell, maps.shape[1])):
+                f = np.float32(row - first) / np.float32(per_cell) + shift
+                blend(a, b, c, d, f, maps[k, row])
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def blend(a: F32, b: F32, c: F32, d: F32, f: Any, out: F32) -> None:
+    """The cubic through rows a, b, c, d at -1, 0, 1, 2, evaluated at f (Lagrange)."""
+    one, two = np.float32(1), np.float32(2)
+    wa = -f * (f - one) * (f - two) / np.float32(6)
+    wb = (f + one) * (f - one) * (f - two) / two
+    wc = -(f + one) * f * (f - two) / two
+    wd = (f + one) * f * (f - one) / np.float32(6)
+    for i in range(len(out)):
+        out[i] = wa * a[i] + wb * b[i] + wc * c[i] + wd * d[i]
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def widen(nodes: F32, step: int, scale: int, gain: Any, offset: Any, out: F32) -> None:
+    """Expand one row of nodes along the row: gain * cubic + offset."""
+    per_cell = step // scale
+    shift = np.float32((scale - 1) / 2 / step)
+    for cell in range((len(out) - 1) // per_cell + 1):
+        a, b, c, d = nodes[cell], nodes[cell + 1], nodes[cell + 2], nodes[cell + 3]
+        c3 = ((d - a) / np.float32(6) + (b - c) / np.float32(2)) * gain
+        c2 = ((a + c) / np.float32(2) - b) * gain
+        c1 = (c - b) * gain - c2 - c3
+        c0 = b * gain + offset
+        start = cell * per_cell
+        for k in range(min(per_cell, len(out) - start)):
+            f = np.float32(k) / np.float32(per_cell) + shift
+            out[start + k] = ((c3 * f + c2) * f + c1) * f + c0
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def feather(view: NDArray[np.uint8], t: F32, t_max: float, black: Any) -> None:
+    """Blend view (rows, columns, channels) to `black` where t (rows, columns) passes t_max.
+
+    Half seen exactly at t_max, over about one view pixel: t over its slope is a distance.
+    """
+    rows, columns = t.shape
+    for row in range(rows):
+        down = t[min(row + 1, rows - 1)] - t[max(row - 1, 0)]
+        for column in range(columns):
+            here = t[row, column]
+            right = t[row, min(column + 1, columns - 1)] - t[row, max(column - 1, 0)]
+            slope = np.sqrt(right * right + down[column] * down[column]) / 2 + np.float32(1e-9)
+            seen = (t_max - here) / slope + np.float32(0.5)
+            if seen < 1:
+                seen = max(seen, np.float32(0))
+                for k in range(view.shape[2]):
+                    value = black + seen * (view[row, column, k] - black)
+                    view[row, column, k] = np.uint8(value + np.float32(0.5))

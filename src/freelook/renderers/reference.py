@@ -1,0 +1,72 @@
+"""The view by definition: NumPy, float64, exact lens formula, one pixel after another.
+
+Slow and plain on purpose; every other renderer is tested against it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from ..camera import Camera
+from ..lens import Floats
+from ..types import Picture, Plane
+from ..viewport import Viewport
+from .blank import black_of, check_fits, plane_scales
+
+
+class ReferenceRenderer:
+    """Bilinear sampling at exactly projected pixels; no feather at the rim."""
+
+    def render(
+        self, picture: Picture, camera: Camera, camera_from_view: Rotation, viewport: Viewport
+    ) -> Picture:
+        check_fits(picture, camera)
+        pixels = coordinates(camera, camera_from_view, viewport)
+        planes = tuple(
+            sample(plane, _at_scale(pixels, scale), black)
+            for plane, scale, black in zip(
+                picture.planes, plane_scales(picture), black_of(picture), strict=True
+            )
+        )
+        return Picture(picture.layout, planes, picture.color)
+
+
+def coordinates(camera: Camera, camera_from_view: Rotation, viewport: Viewport) -> Floats:
+    """Where each view pixel looks in the picture: (height, width, 2); NaN where nothing is seen."""
+    rays = viewport.rays()
+    return camera.project(camera_from_view.apply(rays.reshape(-1, 3)).reshape(rays.shape))
+
+
+def sample(plane: Plane, pixels: Floats, black: float) -> Plane:
+    """Bilinear values at `pixels` (..., 2); `black` counts as the value outside the plane."""
+    rows, columns = plane.shape[:2]
+    padded = np.pad(
+        plane.astype(np.float64),
+        [(1, 1), (1, 1)] + [(0, 0)] * (plane.ndim - 2),
+        constant_values=black,
+    )
+    x = np.clip(np.nan_to_num(pixels[..., 0], nan=-1.0), -1, columns) + 1
+    y = np.clip(np.nan_to_num(pixels[..., 1], nan=-1.0), -1, rows) + 1
+    x0 = np.minimum(x.astype(int), columns)
+    y0 = np.minimum(y.astype(int), rows)
+    fx, fy = x - x0, y - y0
+    if plane.ndim == 3:
+        fx, fy = fx[..., None], fy[..., None]
+    top = padded[y0, x0] * (1 - fx) + padded[y0, x0 + 1] * fx
+    bottom = padded[y0 + 1, x0] * (1 - fx) + padded[y0 + 1, x0 + 1] * fx
+    return np.rint(top * (1 - fy) + bottom * fy).astype(np.uint8)
+
+
+def _at_scale(pixels: Floats, scale: int) -> Floats:
+    """Luma coordinates to those of a plane `scale` times smaller, at its own view pixels.
+
+    A small pixel sits in the middle of the `scale` x `scale` it stands for, here and there.
+    """
+    if scale == 1:
+        return pixels
+    height, width = pixels.shape[:2]
+    even = pixels[: height - height % 2 or 1, : width - width % 2 or 1]
+    middle = (even[::2, ::2] + even[1::2, ::2] + even[::2, 1::2] + even[1::2, 1::2]) / 4
+    grown = np.pad(middle, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
+    return (grown - (scale - 1) / 2) / scale
