@@ -1,0 +1,189 @@
+"""A video file, played at its own pace like a camera, once or in a loop: `flight.mp4`."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import av
+from av.bitstream import BitStreamFilterContext
+from av.container import InputContainer
+from av.error import FFmpegError
+from av.stream import Disposition
+from av.video.stream import VideoStream
+
+from ..clock import NS_PER_S, Clock
+from ..errors import SourceError
+from ..media.annexb import ParameterSets, is_key, join_nals, split_nals
+from ..types import AccessUnit, Counters, Source, StreamInfo
+from . import check_options
+
+KIND = "file"
+
+_ANNEX_B = {"h264": "h264_mp4toannexb", "hevc": "hevc_mp4toannexb"}
+_DEFAULT_FRAME_NS = NS_PER_S // 30
+_LONGEST_STEP_NS = 5 * NS_PER_S  # a longer one is a broken clock, not a slow camera
+_LONGEST_BACK_NS = NS_PER_S
+_LATE_NS = NS_PER_S // 5
+
+
+def recognises(argument: str) -> bool:
+    other = argument.lower().endswith(".sdp") or argument.startswith("/dev/video")
+    return bool(argument) and "://" not in argument and not other
+
+
+def open(
+    argument: str, *, loop: bool, pace: bool, clock: Clock, options: Mapping[str, str]
+) -> Source:
+    """Open and probe the file now; SourceError (no retry) when there is no video to be had."""
+    check_options(argument, options, ())
+    return FileSource(argument, loop=loop, pace=pace, clock=clock)
+
+
+class FileSource:
+    """The first video stream of a file. H.264 and H.265 come as Annex B.
+
+    `media_ns` is the picture's own time in the file. `capture_ns` follows the decoding times,
+    never runs backward, goes on through loops, and is when the unit is due; a reader that comes
+    late by more than 0.2 s gets the rest at the usual pace, not in a burst. Counters: loops,
+    late, odd_times (steps that were backward, missing or absurd).
+    """
+
+    def __init__(self, path: str, *, loop: bool, pace: bool, clock: Clock) -> None:
+        self.counters = Counters()
+        self._path = path
+        self._loop = loop
+        self._pace = pace
+        self._clock = clock
+        self._closing = threading.Event()
+        self._container, self._stream = _open_video(path)
+        self._info = _stream_info(self._stream)
+        self._frame_ns = _frame_ns(self._stream)
+
+    @property
+    def stream(self) -> StreamInfo:
+        """What the container says about the video."""
+        return self._info
+
+    def units(self) -> Iterator[AccessUnit]:
+        self._start_ns = self._due_ns = self._clock()
+        try:
+            while not self._closing.is_set():
+                yield from self._play_once()
+                if not self._loop:
+                    return
+                self._due_ns += self._frame_ns
+                self.counters.add("loops")
+                self._container.close()
+                self._container, self._stream = _open_video(self._path)
+        finally:
+            self._container.close()
+
+    def close(self) -> None:
+        self._closing.set()
+
+    def _play_once(self) -> Iterator[AccessUnit]:
+        self._dts: int | None = None
+        for packet in self._packets():
+            self._due_ns += self._step_ns(packet.dts)
+            if self._pace:
+                self._wait()
+            if self._closing.is_set():
+                return
+            yield self._unit(packet)
+
+    def _packets(self) -> Iterator[av.Packet[VideoStream]]:
+        bsf_name = _ANNEX_B.get(self._info.codec)
+        self._sets = ParameterSets(self._info.codec) if bsf_name else None
+        bsf = BitStreamFilterContext(bsf_name, self._stream) if bsf_name else None
+        try:
+            for packet in self._container.demux(self._stream):
+                if not packet.size:
+                    continue
+                yield from bsf.filter(packet) if bsf else [packet]
+        except FFmpegError as error:
+            after_s = (self._due_ns - self._start_ns) / NS_PER_S
+            raise SourceError(
+                f"{self._path}: the file is damaged {after_s:.1f} s after the start: "
+                f"{error.strerror}"
+            ) from None
+
+    def _unit(self, packet: av.Packet[VideoStream]) -> AccessUnit:
+        data, key = bytes(packet), packet.is_keyframe
+        if self._sets:
+            nals = list(split_nals(data))
+            self._sets.update(nals)
+            key = key or is_key(self._info.codec, nals)
+            if key:
+                data = join_nals(self._sets.complete(nals))
+        time = packet.pts if packet.pts is not None else packet.dts
+        media_ns = None if time is None else self._ns(time)
+        return AccessUnit(self._info, data, key, self._due_ns, media_ns)
+
+    def _ns(self, ticks: int) -> int:
+        base = self._stream.time_base
+        return ticks * base.numerator * NS_PER_S // base.denominator if base else 0
+
+    def _step_ns(self, dts: int | None) -> int:
+        """Time since the unit before; the usual one where the file's own makes no sense.
+
+        After a small step backward nothing moves until the old time is reached again.
+        """
+        if self._dts is None or dts is None:
+            first, self._dts = self._dts is None, self._dts if dts is None else dts
+            return 0 if first else self._frame_ns
+        step_ns = self._ns(dts - self._dts)
+        if 0 <= step_ns <= _LONGEST_STEP_NS:
+            self._dts = dts
+            return step_ns
+        self.counters.add("odd_times")
+        if -_LONGEST_BACK_NS < step_ns < 0:
+            return 0
+        self._dts = dts
+        return self._frame_ns
+
+    def _wait(self) -> None:
+        early_ns = self._due_ns - self._clock()
+        if early_ns > 0:
+            self._closing.wait(early_ns / NS_PER_S)
+        elif early_ns < -_LATE_NS:
+            self.counters.add("late")
+            self._due_ns -= early_ns
+
+
+def _open_video(path: str) -> tuple[InputContainer, VideoStream]:
+    file = Path(path)
+    try:
+        if file.is_dir():
+            raise SourceError(f"{path}: this is a folder, not a video file")
+        if file.stat().st_size == 0:
+            raise SourceError(f"{path}: the file is empty")
+        container = av.open(path, options={"protocol_whitelist": "file"})
+    except FFmpegError as error:
+        raise SourceError(
+            f"{path}: not a video file, or cut off before its index ({error.strerror})"
+        ) from None
+    except (OSError, ValueError) as error:
+        raise SourceError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
+    for stream in container.streams.video:
+        cover = stream.disposition & Disposition.attached_pic
+        if not cover and container.format.name != "tty":  # "tty" takes any text for a picture
+            return container, stream
+    kinds = sorted(str(stream.type) for stream in container.streams) or ["nothing"]
+    container.close()
+    raise SourceError(
+        f"{path}: there is no video in this file, only {' and '.join(dict.fromkeys(kinds))}"
+    )
+
+
+def _stream_info(stream: VideoStream) -> StreamInfo:
+    context = stream.codec_context
+    codec = context.codec.canonical_name
+    extradata = None if codec in _ANNEX_B else context.extradata
+    return StreamInfo(codec, context.width, context.height, context.pix_fmt, extradata)
+
+
+def _frame_ns(stream: VideoStream) -> int:
+    rate = stream.average_rate
+    return int(NS_PER_S / rate) if rate and 1 <= rate <= 1000 else _DEFAULT_FRAME_NS
