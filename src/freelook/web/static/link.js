@@ -1,0 +1,119 @@
+// The data channel "head": poses and frame times from the station, and its clock.
+
+import { normalised } from './quaternion.js';
+import { ClockOffset } from './statistics.js';
+
+/** @typedef {import('./quaternion.js').Quaternion} Quaternion */
+/** @typedef {{q: Quaternion, state: string, stampMs: number | null, receivedMs: number}} StationPose
+ * stampMs: when the tracker measured it, page time; null if not known */
+/**
+ * @typedef {object} Status
+ * @property {{state: string, message: string, age_ms: number | null, codec: string,
+ *   size: [number, number] | null, transcoding: string | null, counters: Record<string, number>}} source
+ * @property {{name: string, state: string, message: string, age_ms: number | null,
+ *   rate_hz: number, counters: Record<string, number>}[]} trackers
+ * @property {number} viewers
+ */
+
+export const SILENT_MS = 1000; // the station sends its status four times a second
+const FRAMES_KEPT = 256;
+
+export class Link {
+  /** @param {() => void} onPose @param {(rtp: number) => void} onFrame */
+  constructor(onPose, onFrame) {
+    this.onPose = onPose;
+    this.onFrame = onFrame;
+    this.clock = new ClockOffset();
+    /** @type {Map<string, StationPose>} newest of each tracker */
+    this.poses = new Map();
+    /** @type {Map<number, number>} RTP time stamp to arrival at the station, its nanoseconds */
+    this.arrivals = new Map();
+    /** @type {Status | null} */
+    this.status = null;
+    this.bad = 0;
+    /** @type {number | null} */
+    this.lastMs = null;
+    /** @type {RTCDataChannel | null} */
+    this.channel = null;
+  }
+
+  /** @param {RTCDataChannel} channel */
+  attach(channel) {
+    this.channel = channel;
+    this.clock = new ClockOffset(); // the station may have been restarted, on another machine
+    let sent = 0;
+    const ping = () => {
+      if (channel.readyState !== 'open' || channel !== this.channel) return;
+      channel.send(JSON.stringify({ type: 'ping', t: performance.now() }));
+      sent += 1;
+      setTimeout(ping, sent < 10 ? 50 : 1000);
+    };
+    channel.onopen = ping;
+    channel.onmessage = ({ data }) => {
+      if (channel === this.channel) this.receive(data, performance.now());
+    };
+  }
+
+  /** Whether the station is heard; false before it ever was. @param {number} nowMs */
+  alive(nowMs) {
+    return this.lastMs !== null && nowMs - this.lastMs < SILENT_MS;
+  }
+
+  /** @param {string} text @param {number} nowMs */
+  receive(text, nowMs) {
+    const known = { pong: this.pong, pose: this.pose, frame: this.frame, status: this.setStatus };
+    const message = parsed(text);
+    const handle = known[/** @type {keyof typeof known} */ (message?.type)];
+    if (!handle || !handle.call(this, message, nowMs)) {
+      this.bad += 1;
+      return;
+    }
+    this.lastMs = nowMs;
+  }
+
+  /** @param {any} message @param {number} nowMs */
+  pong({ t, ns }, nowMs) {
+    this.clock.add(t, nowMs, ns);
+    return true;
+  }
+
+  /** @param {any} message @param {number} nowMs */
+  pose({ tracker, q, state, t }, nowMs) {
+    const unit = Array.isArray(q) ? normalised(q) : null;
+    if (!unit || typeof tracker !== 'string') return false;
+    this.poses.set(tracker, { q: unit, state, stampMs: this.clock.pageMs(t), receivedMs: nowMs });
+    this.onPose();
+    return true;
+  }
+
+  /** @param {any} message */
+  frame({ rtp, arrival }) {
+    if (!Number.isFinite(rtp) || !Number.isFinite(arrival)) return false;
+    this.arrivals.set(rtp, arrival);
+    if (this.arrivals.size > FRAMES_KEPT) this.arrivals.delete(this.arrivals.keys().next().value ?? 0);
+    this.onFrame(rtp);
+    return true;
+  }
+
+  /** @param {any} message */
+  setStatus(message) {
+    if (!message.source || !Array.isArray(message.trackers)) return false;
+    this.status = message;
+    return true;
+  }
+
+  /** When the frame came to the station, page time; null if not known.
+   * @param {number | null} rtp */
+  arrivalMs(rtp) {
+    return rtp === null ? null : this.clock.pageMs(this.arrivals.get(rtp));
+  }
+}
+
+/** @param {unknown} text @returns {any} */
+function parsed(text) {
+  try {
+    return JSON.parse(String(text));
+  } catch {
+    return null;
+  }
+}

@@ -1,0 +1,47 @@
+// What the page asks the station for over HTTP. The token of the page's address goes along.
+
+/**
+ * @typedef {object} Station
+ * @property {string} version @property {string} source @property {boolean} demo
+ * @property {import('./camera.js').CameraJson} camera @property {string[]} trackers
+ * @property {number} hold_s @property {number} ease_s @property {number} hfov_deg
+ */
+
+const token = new URLSearchParams(location.search).get('token');
+
+/** @type {Record<string, string>} */
+export const authorization = token ? { Authorization: `Bearer ${token}` } : {};
+
+/** @param {string} path @returns {URL} */
+export const at = (path) => new URL(path, document.baseURI);
+
+/** @param {string} path @returns {Promise<Response>} an Error with the station's words otherwise */
+async function get(path) {
+  const response = await fetch(at(path), { headers: authorization, cache: 'no-store' });
+  if (!response.ok) {
+    const why = (await response.text()).trim();
+    throw new Error(why || `the station answered ${response.status} to ${path}`);
+  }
+  return response;
+}
+
+/** @returns {Promise<Station>} */
+export const getStation = async () => (await get('api/station')).json();
+
+/** @returns {Promise<string>} */
+export const getShader = async () => (await get('view.glsl')).text();
+
+/** @param {string} tracker @param {'recentre' | 'enable' | 'disable'} action
+ * @returns {Promise<string | null>} null when done, else why not */
+export async function control(tracker, action) {
+  try {
+    const response = await fetch(at('api/control'), {
+      method: 'POST',
+      headers: { ...authorization, 'Content-Type': 'application/json' },
+      body: JSON.stringify({ tracker, action }),
+    });
+    return response.ok ? null : (await response.text()).trim() || `error ${response.status}`;
+  } catch {
+    return 'the station does not answer';
+  }
+}
