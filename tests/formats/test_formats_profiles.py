@@ -139,6 +139,7 @@ FAULTS = [
     (own(parameters={"f": True}), r"parameters\.f must be a number, not True"),
     (own(parameters={"f": None}), r"parameters\.f must be a number, not None"),
     (own(parameters={"f": 1e300}), r"parameters\.f = 1e\+300 is not a number a lens can have"),
+    (own(parameters={"f": 1e-300}), r"parameters\.f = 1e-300 is not a number a lens can have"),
     (own(parameters={"f": -300}), r"does not grow with the angle"),
     (own().replace("300.0", "NaN"), r"NaN is not a number a lens can have"),
     (own().replace("300.0", "-Infinity"), r"-Infinity is not a number"),
@@ -239,14 +240,13 @@ def test_any_parameters_make_a_lens_that_works_or_an_error(
     changes: dict[str, Any] = {"model": model, "parameters": dict(zip(names, values, strict=False))}
     if field_deg is not None:
         changes["field_deg"] = field_deg
-    with np.errstate(under="ignore"):  # a coefficient of 1e-300 is as good as 0
-        try:
-            camera = parse_camera(own(**changes))
-        except ProfileError:
-            return
-        grid = np.linspace(0, camera.theta_max, 100)
-        assert (np.diff(camera.lens.radius(grid)) > 0).all()
-        assert np.isfinite(camera.table.g).all()
+    try:
+        camera = parse_camera(own(**changes))
+    except ProfileError:
+        return
+    grid = np.linspace(0, camera.theta_max, 100)
+    assert (np.diff(camera.lens.radius(grid)) > 0).all()
+    assert np.isfinite(camera.table.g).all()
 
 
 @given(st.text(max_size=200) | st.text(alphabet='{}[]",:0123456789.eE+-KDfa ', max_size=80))

@@ -100,10 +100,10 @@ def check_keys(data: Mapping[str, Any], required: set[str], optional: set[str], 
 
 
 def number(value: Any, where: str) -> float:
-    """A finite float, or ProfileError."""
+    """A float of a sane size, or ProfileError."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise ProfileError(f"{where} must be a number, not {value!r}")
-    if not abs(value) < 1e12:
+    if not (value == 0 or 1e-30 < abs(value) < 1e12):
         raise ProfileError(f"{where} = {value} is not a number a lens can have")
     return float(value)
 
