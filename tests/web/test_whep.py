@@ -7,8 +7,9 @@ from typing import Any
 
 import pytest
 from aiortc import rtcrtpreceiver
-from freelook.media.annexb import split_nals
 from whep_peer import Camera, bench, until
+
+from freelook.media.annexb import split_nals
 
 
 @pytest.fixture
@@ -36,7 +37,7 @@ def test_h264_arrives_untouched_and_decodes(received: list[tuple[int, bytes]]) -
     async def run() -> None:
         async with bench() as station:
             viewer = await station.viewer()
-            with Camera(station.ingest) as camera:
+            with Camera(station.source) as camera:
                 await until(lambda: len(viewer.frames) > 20, "20 decoded frames")
             await viewer.close()
             sent = [list(split_nals(unit.data)) for unit in camera.sent]

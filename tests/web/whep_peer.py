@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import queue
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -15,15 +16,15 @@ import numpy as np
 import pytest
 from aiohttp.test_utils import TestServer
 from aiortc import RTCConfiguration, RTCPeerConnection, RTCSessionDescription
+
 from freelook.clock import now_ns
+from freelook.errors import SourceError
 from freelook.formats import load_camera
 from freelook.head import Head
-from collections import namedtuple
-
-IngestStatus = namedtuple("IngestStatus", "state message age_ns stream counters")
+from freelook.ingest import Ingest
 from freelook.mailbox import Mailbox
 from freelook.media.encoder import Encoder
-from freelook.types import AccessUnit, Counters, Frame, Picture, Pose, StreamInfo
+from freelook.types import AccessUnit, Counters, Frame, Picture, Pose
 from freelook.web.security import Guard
 from freelook.web.server import make_app
 from freelook.web.station import About, Station
@@ -41,43 +42,27 @@ async def until(condition: Callable[[], Any], what: str, seconds: float = 10.0) 
     return value
 
 
-class ScriptedIngest:
-    """Follows the contract of `freelook.ingest.Ingest`; the test says what arrives."""
+class ScriptedSource:
+    """A source whose coded pictures, and whose end, the test makes."""
 
     def __init__(self) -> None:
-        self.state = "connecting"
-        self.message = ""
-        self.stream: StreamInfo | None = None
-        self.closed = False
-        self.boxes: list[Mailbox[Frame]] = []
-        self._listeners: list[Callable[[AccessUnit], None]] = []
+        self.counters = Counters()
+        self._queue: queue.Queue[AccessUnit | SourceError | None] = queue.Queue()
 
-    def start(self) -> None:
-        self.state = "live"
+    def units(self) -> Iterator[AccessUnit]:
+        while (item := self._queue.get()) is not None:
+            if isinstance(item, SourceError):
+                raise item
+            yield item
 
     def close(self) -> None:
-        self.closed = True
-
-    def subscribe(self, listener: Callable[[AccessUnit], None]) -> Callable[[], None]:
-        self._listeners.append(listener)
-        return lambda: self._listeners.remove(listener)
-
-    def frames(self) -> Mailbox[Frame]:
-        self.boxes.append(Mailbox())
-        return self.boxes[-1]
-
-    def release(self, mailbox: Mailbox[Frame]) -> None:
-        self.boxes.remove(mailbox)
-
-    def status(self, now_ns: int) -> IngestStatus:
-        return IngestStatus(
-            self.state, self.message, 1_000_000, self.stream, Counters({"units": 1})
-        )
+        self._queue.put(None)
 
     def arrive(self, unit: AccessUnit) -> None:
-        self.stream = unit.stream
-        for listener in tuple(self._listeners):
-            listener(unit)
+        self._queue.put(unit)
+
+    def fail(self, why: str) -> None:
+        self._queue.put(SourceError(why, retry=True))
 
 
 class ScriptedTracker:
@@ -105,11 +90,10 @@ class Camera:
     """Makes real coded pictures of moving noise, and sends them from its own thread."""
 
     def __init__(
-        self, ingest: ScriptedIngest, codec: str = "h264", size: tuple[int, int] = SIZE
+        self, source: ScriptedSource, codec: str = "h264", size: tuple[int, int] = SIZE
     ) -> None:
         self.sent: list[AccessUnit] = []
-        self.frames: list[Frame] = []
-        self._ingest = ingest
+        self._source = source
         self._encoder = Encoder(size, codec=codec)
         self._texture = np.random.default_rng(1).integers(16, 235, (size[1] // 8, size[0] // 8))
         self._stop = threading.Event()
@@ -125,12 +109,9 @@ class Camera:
 
     def send(self, *, key: bool = False) -> AccessUnit:
         """Encode and send one picture now."""
-        frame = self._frame()
-        [unit] = self._encoder.encode(frame, key=key)
+        [unit] = self._encoder.encode(self._frame(), key=key)
         self.sent.append(unit)
-        self._ingest.arrive(unit)
-        for box in tuple(self._ingest.boxes):
-            box.put(frame)
+        self._source.arrive(unit)
         return unit
 
     def _run(self) -> None:
@@ -203,10 +184,10 @@ class Bench:
     """A running station, its scripted inputs, and viewers."""
 
     def __init__(self, heads: dict[str, ScriptedTracker], **options: Any) -> None:
-        self.ingest = ScriptedIngest()
+        self.sources: list[ScriptedSource] = []
         self.trackers = heads
         self.station = Station(
-            self.ingest,
+            Ingest(self._open, retry_s=(0.05, 0.1)),
             load_camera("demo"),
             {name: Head(name, tracker) for name, tracker in heads.items()},
             About("scripted"),
@@ -214,6 +195,15 @@ class Bench:
         )
         self.base = ""
         self.http: Any = None
+
+    @property
+    def source(self) -> ScriptedSource:
+        """The one that is open now."""
+        return self.sources[-1]
+
+    def _open(self) -> ScriptedSource:
+        self.sources.append(ScriptedSource())
+        return self.source
 
     async def viewer(self) -> Peer:
         return await Peer(self.http, self.base).watch()

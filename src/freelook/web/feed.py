@@ -4,33 +4,16 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from typing import Any, Protocol
 
 from ..errors import FreelookError
-from ..mailbox import Mailbox
+from ..ingest import Ingest
 from ..media.encoder import Encoder
 from ..media.passthrough import why_transcode
-from ..types import AccessUnit, Counters, Frame
+from ..types import AccessUnit, Counters, Frame, StreamInfo
 from .units import Hub
 
 # How long the transcoder sleeps when no frames come; closing wakes it at once.
 NAP_S = 1.0
-
-
-class Ingest(Protocol):
-    """What the station needs of `freelook.ingest.Ingest`."""
-
-    def start(self) -> None: ...
-
-    def close(self) -> None: ...
-
-    def subscribe(self, listener: Callable[[AccessUnit], None]) -> Callable[[], None]: ...
-
-    def frames(self) -> Mailbox[Frame]: ...
-
-    def release(self, mailbox: Mailbox[Frame]) -> None: ...
-
-    def status(self, now_ns: int) -> Any: ...
 
 
 class Feed:
@@ -47,6 +30,7 @@ class Feed:
         self._ingest = ingest
         self._hub = hub
         self._wanted = False
+        self._stream: StreamInfo | None = None
         self._transcoder: Transcoder | None = None
         self._lock = threading.Lock()
         self._unsubscribe: Callable[[], None] | None = None
@@ -73,8 +57,10 @@ class Feed:
         return True
 
     def _on_unit(self, unit: AccessUnit) -> None:
-        """On the ingest thread."""
-        why = why_transcode(unit)
+        """On the ingest thread. Once a stream cannot be passed on, it is not tried again."""
+        known = self.why if unit.stream == self._stream else None
+        self._stream = unit.stream
+        why = known or why_transcode(unit)
         if why != self.why:
             self.why = why
             self._hub.restart()
@@ -122,7 +108,6 @@ class Transcoder:
         """Ends by itself soon; does not wait."""
         self._stopped = True
         self._ingest.release(self._frames)
-        self._frames.close()
 
     def _run(self) -> None:
         while not self._stopped:

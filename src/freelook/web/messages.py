@@ -9,6 +9,7 @@ from typing import Any
 from ..camera import Camera
 from ..gimbal import Aim
 from ..head import HeadStatus
+from ..ingest import IngestStatus
 from ..rotations import FRD_FROM_RDF, RDF_FROM_FRD, to_wxyz
 from ..types import Counters
 
@@ -64,17 +65,17 @@ def status(source: dict[str, Any], trackers: Iterable[HeadStatus], viewers: int)
 
 
 def source_status(
-    ingest: Any, why_transcode: str | None, message: str | None, extra: dict[str, int]
+    ingest: IngestStatus, why_transcode: str | None, trouble: str | None, extra: dict[str, int]
 ) -> dict[str, Any]:
     stream = ingest.stream
     return {
         "state": ingest.state,
-        "message": ingest.message or message,
+        "message": ingest.message or trouble,
         "age_ms": milliseconds(ingest.age_ns),
         "codec": stream.codec if stream else None,
         "size": [stream.width, stream.height] if stream and stream.width else None,
         "transcoding": why_transcode,
-        "counters": counts(ingest.counters) | extra,
+        "counters": ingest.counters | extra,
     }
 
 

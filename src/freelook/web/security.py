@@ -43,7 +43,7 @@ class Guard:
     def foreign(self, host: str, origin: str | None) -> str | None:
         """Why a request comes from a foreign place; None when it does not."""
         name = _host_name(host)
-        if self.token is None and not _is_address(name) and name not in self.names | {"localhost"}:
+        if self.token is None and not is_address(name) and name not in self.names | {"localhost"}:
             return f"the host name {name!r} is not one of this station's; use its address"
         if origin is not None and origin.lower().partition("://")[2] != host.lower():
             return f"requests from the page {origin} are not accepted"
@@ -61,7 +61,7 @@ def is_loopback(host: str) -> bool:
     """Whether only this machine reaches a server listening on `host`."""
     if host.lower() == "localhost":
         return True
-    return _is_address(host) and ipaddress.ip_address(host).is_loopback
+    return is_address(host) and ipaddress.ip_address(host).is_loopback
 
 
 def local_addresses() -> list[str]:
@@ -178,7 +178,7 @@ def _host_name(host: str) -> str:
         return ""
 
 
-def _is_address(name: str) -> bool:
+def is_address(name: str) -> bool:
     try:
         ipaddress.ip_address(name)
     except ValueError:

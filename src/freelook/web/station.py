@@ -9,15 +9,17 @@ import asyncio
 import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from .. import __version__
 from ..camera import Camera
 from ..clock import Clock, now_ns
 from ..head import Head
+from ..ingest import Ingest
 from ..types import Counters
 from . import messages
-from .feed import Feed, Ingest
+from .feed import Feed
 from .units import Hub
 from .whep import Viewer, Viewers
 
@@ -66,16 +68,17 @@ class Station:
         self._states: dict[str, str] = {}
 
     async def start(self) -> None:
+        """SourceError when the source can never work."""
         self._loop = asyncio.get_running_loop()
         self._hub = Hub(self._loop)
         self._feed = Feed(self._ingest, self._hub)
         self.viewers = Viewers(
             self._hub, self, self._most_viewers, lambda count: self._feed.want(count > 0)
         )
-        self._feed.start()
         self._ingest.start()
+        self._feed.start()
         for name, head in self._heads.items():
-            head.start(lambda name=name: self._pose_arrived(name))
+            head.start(partial(self._pose_arrived, name))
         self._ticker = asyncio.create_task(self._tick())
 
     async def close(self) -> None:

@@ -58,7 +58,7 @@ class RtpClock:
         return self.last
 
 
-class UnitTrack(MediaStreamTrack):  # type: ignore[misc]
+class UnitTrack(MediaStreamTrack):
     """The pictures of a hub, from the last key picture on.
 
     `on_frame(rtp, capture_ns)` is called for each picture as it goes out, with the time stamp
@@ -82,7 +82,7 @@ class UnitTrack(MediaStreamTrack):  # type: ignore[misc]
         self._origin: int | None = None
         self._unsubscribe: Callable[[], None] | None = None
 
-    async def recv(self) -> av.Packet:
+    async def recv(self) -> av.Packet[Any]:
         """The next coded picture; called by aiortc once the viewer is connected."""
         self._learn_origin()
         if self._unsubscribe is None:
@@ -127,13 +127,13 @@ class UnitTrack(MediaStreamTrack):  # type: ignore[misc]
         self._queue.follow()
         self._counters.add("replays")
 
-    async def _replayed(self) -> av.Packet:
+    async def _replayed(self) -> av.Packet[Any]:
         unit = self._replay.popleft()
         await asyncio.sleep(len(unit.data) / REPLAY_BYTES_PER_S)
         ticks = self._clock.stamp_replayed(self._newest_replayed_ns, len(self._replay))
         return self._packet(unit, ticks)
 
-    def _packet(self, unit: AccessUnit, ticks: int) -> av.Packet:
+    def _packet(self, unit: AccessUnit, ticks: int) -> av.Packet[Any]:
         packet = av.Packet(unit.data)
         packet.pts = packet.dts = ticks
         packet.time_base = RTP_TIME_BASE

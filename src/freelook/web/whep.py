@@ -19,6 +19,7 @@ from .track import UnitTrack
 from .units import Hub
 
 CONNECT_S = 20.0
+CLOSE_S = 5.0
 # A data channel that holds more than this is not keeping up; what is newest comes later.
 FULL_BYTES = 16_384
 
@@ -53,7 +54,7 @@ class Viewer:
         self.counters = Counters()
         self._events = events
         self._channel: Any = None
-        self._gone = False
+        self._closing: asyncio.Task[None] | None = None
         self._tasks: set[asyncio.Task[None]] = set()
         self._pc = RTCPeerConnection(RTCConfiguration(iceServers=[]))
         self._track = UnitTrack(hub, self.counters, self._frame_sent)
@@ -100,15 +101,20 @@ class Viewer:
         return True
 
     async def close(self) -> None:
-        """End the session; safe to call twice."""
-        if self._gone:
-            return
-        self._gone = True
+        """End the session; safe to call twice, and then waits for the first call."""
+        if self._closing is None:
+            self._closing = asyncio.ensure_future(self._close())
+        await asyncio.shield(self._closing)
+
+    async def _close(self) -> None:
         self._track.stop()
-        for task in self._tasks - {asyncio.current_task()}:
+        for task in self._tasks:
             task.cancel()
-        self._events.gone(self)
-        await self._pc.close()
+        try:
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(self._pc.close(), CLOSE_S)
+        finally:
+            self._events.gone(self)
 
     def _spawn(self, work: Any) -> None:
         task = asyncio.ensure_future(work)
@@ -118,7 +124,7 @@ class Viewer:
     async def _expect_connection(self) -> None:
         await asyncio.sleep(CONNECT_S)
         if self._pc.connectionState != "connected":
-            await self.close()
+            self._closing = self._closing or asyncio.ensure_future(self._close())
 
     async def _add_candidates(self, lines: list[str]) -> None:
         """Browsers hide their addresses behind mDNS names, which take a second to look up.

@@ -1,0 +1,228 @@
+"""Look around in live video: serves the page that shows the pilot's view.
+
+The video goes to the browser untouched wherever the browser can decode it; the page turns the
+view with the newest head pose. Stop with Ctrl-C.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import contextlib
+import dataclasses
+import webbrowser
+from collections.abc import Awaitable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..camera import Camera
+from ..errors import FreelookError
+from ..formats import builtin_names, load_camera
+from ..gimbal import Gimbal, GimbalSettings
+from ..head import Head
+from ..rotations import body_from_view
+from ..trackers import known_trackers, open_tracker
+from ..viewport import Viewport
+from ._progress import StatusLine, say
+
+if TYPE_CHECKING:  # the web libraries are slow to load, and may be missing
+    from ..ingest import Ingest
+    from ..web.serving import Door
+    from ..web.station import About, Station
+
+DEFAULT_PORT = 8042
+HOLD_S = GimbalSettings().hold_s
+EASE_S = GimbalSettings().ease_s
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "source",
+        metavar="SOURCE",
+        help=f"a file, device or address, or KIND:ARGUMENT (kinds: {', '.join(source_kinds())})",
+    )
+    parser.add_argument(
+        "--lens",
+        metavar="PROFILE",
+        help=f"lens profile: a file, or one of: {', '.join(builtin_names())}",
+    )
+    parser.add_argument("--loop", action="store_true", help="play a recording over and over")
+    parser.add_argument(
+        "--mount",
+        type=_three_angles,
+        metavar="YAW,PITCH,ROLL",
+        help="how the camera is fixed to the vehicle, degrees right, up, right side down "
+        "(write --mount=-10,0,0 with a leading minus)",
+    )
+    add_flying_arguments(parser)
+
+
+def add_flying_arguments(parser: argparse.ArgumentParser) -> None:
+    """What `fly` and `demo` share."""
+    parser.add_argument(
+        "--tracker",
+        action="append",
+        default=[],
+        metavar="KIND:ARGUMENT",
+        help=f"a head tracker, can be given again (kinds: {', '.join(known_trackers())}); "
+        "mouse, touch, keys, gamepad and phone work in the page without any",
+    )
+    parser.add_argument(
+        "--hold", type=float, default=HOLD_S, metavar="S", help="hold a lost tracker's view so long"
+    )
+    parser.add_argument(
+        "--ease", type=float, default=EASE_S, metavar="S", help="then go to the centre in this time"
+    )
+    parser.add_argument(
+        "--hfov", type=float, default=90.0, metavar="DEG", help="horizontal field of view at start"
+    )
+    _add_serving_arguments(parser)
+
+
+def _add_serving_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--port",
+        type=int,
+        default=DEFAULT_PORT,
+        metavar="N",
+        help=f"port of the page (default {DEFAULT_PORT}, 0: any free one)",
+    )
+    parser.add_argument(
+        "--host",
+        default="127.0.0.1",
+        metavar="ADDRESS",
+        help="listen here; 0.0.0.0 lets other machines in, with a token and by https",
+    )
+    parser.add_argument("--tls", action="store_true", help="serve by https on this machine too")
+    parser.add_argument("--token", metavar="T", help="the token to ask for (default: a random one)")
+    parser.add_argument("--cert", type=Path, metavar="FILE", help="TLS certificate (PEM)")
+    parser.add_argument("--key", type=Path, metavar="FILE", help="its private key (PEM)")
+    parser.add_argument(
+        "--no-browser", action="store_true", help="only print the address, open no browser"
+    )
+
+
+def source_kinds() -> list[str]:
+    """Kinds of sources, as far as the libraries they need are installed."""
+    with contextlib.suppress(ModuleNotFoundError):
+        from ..sources import modules
+
+        return list(modules())
+    return []
+
+
+def run(args: argparse.Namespace) -> int:
+    from ..ingest import Ingest
+    from ..sources import open_source
+    from ..web.station import About
+
+    camera = mounted_camera(args.lens, args.mount)
+    ingest = Ingest(lambda: open_source(args.source, loop=args.loop))
+    about = About(args.source, False, args.hold, args.ease, args.hfov)
+    fly(args, ingest, camera, about, never())
+    return 0
+
+
+def fly(
+    args: argparse.Namespace, ingest: Ingest, camera: Camera, about: About, until: Awaitable[None]
+) -> None:
+    """Serve the page until Ctrl-C or `until`."""
+    from ..web.serving import open_door, serve
+    from ..web.station import Station
+
+    Viewport((16, 9), about.hfov_deg)  # says what is wrong with it
+    heads = open_heads(args.tracker, GimbalSettings(hold_s=about.hold_s, ease_s=about.ease_s))
+    door = open_door(
+        args.host,
+        args.port,
+        token=args.token,
+        tls=args.tls,
+        certificate=args.cert,
+        key=args.key,
+    )
+    station = Station(ingest, camera, heads, about)
+    with StatusLine() as line:
+        asyncio.run(
+            serve(
+                station,
+                door,
+                ready=lambda: announce(door, not args.no_browser),
+                report=lambda station: line.show(summary(station)),
+                until=until,
+            )
+        )
+
+
+def mounted_camera(lens: str | None, mount: Sequence[float] | None) -> Camera:
+    """The camera of a lens profile, turned as it is mounted."""
+    if lens is None:
+        raise FreelookError(
+            "which lens does the camera have? give --lens PROFILE, a file or one of: "
+            + ", ".join(builtin_names())
+        )
+    camera = load_camera(lens)
+    if mount is None:
+        return camera
+    return dataclasses.replace(camera, camera_from_body=body_from_view(*mount).inv())
+
+
+def open_heads(specs: Sequence[str], settings: GimbalSettings) -> dict[str, Head]:
+    """Heads by name: the tracker's kind, numbered from the second of a kind on."""
+    heads: dict[str, Head] = {}
+    try:
+        for spec in specs:
+            name = _free_name(spec.partition(":")[0].partition("?")[0], heads)
+            heads[name] = Head(name, open_tracker(spec), Gimbal(settings))
+    except BaseException:
+        for head in heads.values():
+            head.close()
+        raise
+    return heads
+
+
+def _free_name(kind: str, taken: dict[str, Head]) -> str:
+    names = [kind, *(f"{kind}{number}" for number in range(2, len(taken) + 2))]
+    return next(name for name in names if name not in taken)
+
+
+def announce(door: Door, open_browser: bool) -> None:
+    from ..web.serving import can_open_browser
+
+    for url in door.urls:
+        say(f"view: {url}")
+    if door.tls is not None:
+        say("the browser will warn of a certificate it does not know, unless you gave a known one")
+    if open_browser and can_open_browser():
+        webbrowser.open(door.urls[-1])
+
+
+def summary(station: Station) -> str:
+    """The station's state in one line."""
+    status = station.status()
+    source = status["source"]
+    parts = [" ".join(filter(None, (source["state"], source["codec"], _size(source["size"]))))]
+    parts += [source["message"], source["transcoding"] and f"transcoding: {source['transcoding']}"]
+    parts += [f"{t['name']} {t['state']}" for t in status["trackers"]]
+    viewers = status["viewers"]
+    parts.append(f"{viewers} viewer{'' if viewers == 1 else 's'}")
+    return "; ".join(filter(None, parts))
+
+
+def _size(size: Sequence[int] | None) -> str:
+    return f"{size[0]}x{size[1]}" if size else ""
+
+
+async def never() -> None:
+    await asyncio.Event().wait()
+
+
+def _three_angles(text: str) -> tuple[float, float, float]:
+    try:
+        yaw, pitch, roll = (float(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"expected three angles like 0,-15,0, not '{text}'"
+        ) from None
+    if not all(abs(angle) <= 360 for angle in (yaw, pitch, roll)):
+        raise argparse.ArgumentTypeError(f"angles must lie within 360 degrees, not '{text}'")
+    return yaw, pitch, roll
