@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import ipaddress
 import socket
 import struct
 import threading
 from selectors import EVENT_READ, DefaultSelector
+
+from .errors import SourceError
 
 BUFFER_BYTES = 8 << 20  # asked for; the kernel gives what net.core.rmem_max allows
 MAX_DATAGRAM = 65536
@@ -94,3 +97,16 @@ class DatagramListener:
         self._selector.close()
         for each in (self._socket, self._wake, self._waker):
             each.close()
+
+
+def listen(argument: str, host: str, port: int) -> DatagramListener:
+    """A listener, or a SourceError that says what to do."""
+    try:
+        return DatagramListener(host, port)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        if error.errno == errno.EADDRINUSE:
+            reason = f"another program already receives on port {port}"
+        elif error.errno == errno.EADDRNOTAVAIL:
+            reason = f"{host} is not an address of this machine; use 0.0.0.0 for all of them"
+        raise SourceError(f"{argument}: {reason}") from None

@@ -14,7 +14,7 @@ _PATIENCE = 300  # units without a key unit; then the stream refreshes some othe
 
 
 class DecodeThread:
-    """Decodes the newest units of a source on its own thread, so that a slow decoder delays neither socket nor listeners.
+    """Decodes on its own thread: a slow decoder must delay neither socket nor listeners.
 
     At most a few units wait. When the decoder cannot keep up they are thrown away (`skipped`)
     until the next key unit: late pictures are worth nothing. `size` is the newest frame's,

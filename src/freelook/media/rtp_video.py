@@ -8,7 +8,7 @@ from ..types import AccessUnit, Counters, StreamInfo
 from .annexb import ParameterSets
 from .depacketise import CodedPicture, Depacketiser, guess_codec
 from .rtp import ReorderBuffer, RtpPacket, parse_packet
-from .sps import parse_sps
+from .sps import stream_info
 
 SENDER_GONE_NS = 200_000_000
 
@@ -18,8 +18,8 @@ class RtpVideo:
 
     With `codec` None the first packets that leave no doubt decide between H.264 and H.265. With
     `payload_type` None the first sender's is taken. Another sender (SSRC) or payload type takes
-    over when the present one has been silent for 0.2 s: a restarted camera comes back by itself, and two
-    cameras sending to one port do not mix.
+    over when the present one has been silent for 0.2 s: a restarted camera comes back by itself,
+    and two cameras sending to one port do not mix.
 
     Counters: packets, malformed, foreign (other sender or payload type), undecided (before the
     codec was known), lost, reordered, duplicate, late, restarts, damaged, oversized.
@@ -111,12 +111,6 @@ class RtpVideo:
 
     def _pictures(self, pictures: list[CodedPicture]) -> list[AccessUnit]:
         if self._sets.sps != self._sps:
-            self._learn()
+            self._sps = self._sets.sps
+            self._stream = stream_info(self._stream.codec, self._sps)
         return [AccessUnit(self._stream, p.data, p.key, p.arrival_ns) for p in pictures]
-
-    def _learn(self) -> None:
-        self._sps = self._sets.sps
-        info = parse_sps(self._stream.codec, self._sps) if self._sps else None
-        if info:
-            codec = self._stream.codec
-            self._stream = StreamInfo(codec, info.width, info.height, info.pixel_format)

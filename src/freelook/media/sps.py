@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..types import StreamInfo
 from .bits import BitReader
 
 _HIGH_PROFILES = {100, 110, 122, 244, 44, 83, 86, 118, 128, 138, 139, 134, 135}
@@ -40,6 +41,14 @@ def parse_sps(codec: str, nal: bytes) -> SpsInfo | None:
     except ValueError:
         return None
     return info if 0 < info.width <= 16384 and 0 < info.height <= 16384 else None
+
+
+def stream_info(codec: str, sps: bytes | None) -> StreamInfo:
+    """What an SPS tells about its stream; without one, or with a damaged one, only the codec."""
+    info = parse_sps(codec, sps) if sps else None
+    if info is None:
+        return StreamInfo(codec)
+    return StreamInfo(codec, info.width, info.height, info.pixel_format)
 
 
 def _h264(nal: bytes) -> SpsInfo:

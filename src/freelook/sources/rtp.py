@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import errno
 import ipaddress
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from ..clock import NS_PER_S, Clock
-from ..datagrams import DatagramListener
+from ..datagrams import DatagramListener, listen
 from ..errors import SourceError
 from ..media.rtp_video import RtpVideo
 from ..media.sdp import parse_sdp
@@ -113,16 +112,3 @@ class RtpSource:
 
     def close(self) -> None:
         self._listener.close()
-
-
-def listen(argument: str, host: str, port: int) -> DatagramListener:
-    """A listener, or a SourceError that says what to do."""
-    try:
-        return DatagramListener(host, port)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        if error.errno == errno.EADDRINUSE:
-            reason = f"another program already receives on port {port}"
-        elif error.errno == errno.EADDRNOTAVAIL:
-            reason = f"{host} is not an address of this machine; use 0.0.0.0 for all of them"
-        raise SourceError(f"{argument}: {reason}") from None
