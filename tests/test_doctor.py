@@ -12,7 +12,10 @@ import pytest
 
 from freelook import doctor
 from freelook.cli import doctor as command
+from freelook.cli import fly
 from freelook.doctor import Check
+from freelook.sources import rtp
+from freelook.trackers import opentrack
 
 REQUIREMENTS = [
     "numpy>=1.26",
@@ -78,6 +81,15 @@ def test_camera_without_permission_says_which_group(
     (line,) = doctor.camera_lines(tmp_path, tmp_path)
     assert line.state == "no"
     assert "usermod -aG video" in line.todo
+
+
+def test_ports_examined_are_the_defaults() -> None:
+    ports = {use: port for _, port, use, _ in doctor.PORTS}
+    assert ports == {
+        "the page": fly.DEFAULT_PORT,
+        "OpenTrack": opentrack.DEFAULT_PORT,
+        "RTP video": rtp._DEFAULT_PORT,
+    }
 
 
 @pytest.mark.parametrize(("kind", "type_"), [("tcp", "SOCK_STREAM"), ("udp", "SOCK_DGRAM")])

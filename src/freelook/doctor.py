@@ -30,7 +30,7 @@ EXTRAS = (*ESSENTIAL_EXTRAS, "rtsp", "cli")
 HARDWARE_ENCODERS = ("h264_nvenc", "h264_vaapi", "h264_qsv", "h264_amf", "h264_videotoolbox")
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "firefox", "microsoft-edge")
 PORTS = (
-    ("tcp", 8080, "the page", "choose another: freelook fly --port N"),
+    ("tcp", 8042, "the page", "choose another: freelook fly --port N"),
     ("udp", 4242, "OpenTrack", "close the other receiver, or use another port in both programs"),
     ("udp", 5004, "RTP video", "close the other receiver, or send to another port"),
 )
@@ -234,7 +234,7 @@ def check_network() -> Iterator[Check]:
     if address is None:
         yield Check("network", "warn", "no network but this machine itself", "connect for phones")
         return
-    todo = "for a phone: freelook fly --host 0.0.0.0 --tls (its motion sensors want https)"
+    todo = "to let a phone in: freelook fly ... --host 0.0.0.0 (by https, which its sensors want)"
     yield Check("network", "ok", f"this machine is {address}", todo)
 
 
