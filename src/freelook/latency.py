@@ -8,8 +8,6 @@ damaged stamp fails its check and is not read as a time.
 
 from __future__ import annotations
 
-import numpy as np
-
 from .types import Plane
 
 BLOCK_PX = 16
