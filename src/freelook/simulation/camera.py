@@ -6,11 +6,12 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ..camera import Camera
 from ..color import rgb24_from_rgb, yuv_from_rgb_matrix
-from ..types import ColorSpace, Frame, Picture
+from ..types import ColorSpace, Frame, Picture, Plane
 from ..viewport import Viewport
 from .flight import FigureEight, Floats, State
 from .tiles import SIDE, TILE, RayTiles, in_threads, make_tiles, make_view, shade_planes
@@ -81,7 +82,7 @@ class SimulatedCamera:
         """`exact_rgb` as an rgb24 picture."""
         return rgb24_from_rgb(self.exact_rgb(t_ns, body_from_view, viewport))
 
-    def _black_planes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _black_planes(self) -> tuple[Plane, Plane, Plane]:
         width, height = self.camera.size
         half = ((height + 1) // 2, (width + 1) // 2)
         black = np.uint8(self._yuv[0, 3])
@@ -92,7 +93,7 @@ class SimulatedCamera:
         )
 
 
-def _pixel_tiles(camera: Camera) -> tuple[np.ndarray, RayTiles]:
+def _pixel_tiles(camera: Camera) -> tuple[NDArray[np.int64], RayTiles]:
     """Corners (tiles, 2) and rays of all 16x16 tiles that see anything."""
     width, height = camera.size
     columns, rows = -(-width // SIDE), -(-height // SIDE)
@@ -100,7 +101,7 @@ def _pixel_tiles(camera: Camera) -> tuple[np.ndarray, RayTiles]:
     rays = camera.ray(np.stack([x, y], axis=-1).astype(np.float64))
     rays[height:], rays[:, width:] = np.nan, np.nan
     rays = rays.reshape(rows, SIDE, columns, SIDE, 3).swapaxes(1, 2).reshape(-1, TILE, 3)
-    valid = np.isfinite(rays).all(axis=-1)
+    valid = np.isfinite(rays[..., 2])
     seen = valid.any(axis=1)
     corner_y, corner_x = np.mgrid[0:rows, 0:columns] * SIDE
     corners = np.stack([corner_x.ravel(), corner_y.ravel()], axis=-1)[seen]

@@ -28,7 +28,7 @@ class Pyramid(NamedTuple):
 
 def make_pyramid(texture: NDArray[Any], texel_m: float) -> Pyramid:
     """All levels of a square texture (side, side, channels), side a power of two, to 1 x 1."""
-    levels = [np.asarray(texture, dtype=np.float32)]
+    levels: list[NDArray[Any]] = [np.asarray(texture, dtype=np.float32)]
     while len(levels[-1]) > 1:
         fine = levels[-1]
         levels.append((fine[::2, ::2] + fine[1::2, ::2] + fine[::2, 1::2] + fine[1::2, 1::2]) / 4)

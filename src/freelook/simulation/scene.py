@@ -29,12 +29,8 @@ FACES = {"": -1.0, "north": 0.0, "south": 1.0, "east": 2.0, "west": 3.0}
 
 SUN_AZIMUTH_DEG, SUN_ELEVATION_DEG = 292.0, 34.0
 WHITE, ASPHALT, CONCRETE = (0.95, 0.95, 0.93), (0.31, 0.31, 0.33), (0.62, 0.61, 0.58)
-RED, BLUE, YELLOW, GREEN = (
-    (0.83, 0.13, 0.12),
-    (0.13, 0.33, 0.75),
-    (0.95, 0.76, 0.12),
-    (0.1, 0.5, 0.25),
-)
+RED, BLUE = (0.83, 0.13, 0.12), (0.13, 0.33, 0.75)
+YELLOW, GREEN = (0.95, 0.76, 0.12), (0.10, 0.50, 0.25)
 WOOD, BRICK, STEEL = (0.45, 0.33, 0.22), (0.66, 0.36, 0.26), (0.74, 0.77, 0.80)
 
 
@@ -250,7 +246,7 @@ def _village() -> Iterator[tuple[int, Row]]:
 
 def _trees() -> Iterator[tuple[int, Row]]:
     rng = np.random.default_rng(4)
-    rows = [(north, -118.0) for north in range(-300, 320, 26)]
+    rows = [(north, -118.0) for north in np.arange(-300.0, 320.0, 26.0)]
     rows += [(-340.0 + rng.uniform(-70, 70), rng.uniform(60, 170)) for _ in range(16)]
     rows += [(rng.uniform(180, 330), rng.uniform(175, 310)) for _ in range(14)]
     rows += [(rng.uniform(-60, 320), rng.uniform(-290, -150)) for _ in range(18)]

@@ -70,7 +70,7 @@ def shade_ground(landscape, position, softness, s):  # type: ignore[no-untyped-d
             continue
         kind = scene.kinds[index]
         _cover(kind, row, scene.glyphs, position, softness, s)
-        if kind == SHADOW or kind == DISC:
+        if kind in (SHADOW, DISC):
             for k in range(s.shape[1]):
                 s[LIGHT, k] = min(s[LIGHT, k], F(1) - (F(1) - SHADE) * s[COVER, k])
         else:
@@ -125,7 +125,7 @@ def _textures(ground, detail, softness, s):  # type: ignore[no-untyped-def]
 @jit()
 def _cover(kind, row, glyphs, p, softness, s):  # type: ignore[no-untyped-def]
     """How much a thing lying on the ground covers each ray's spot, into s[COVER]."""
-    if kind == RECT or kind == SHADOW:
+    if kind in (RECT, SHADOW):
         for k in range(s.shape[1]):
             cover = strip(s[NORTH, k], row[4], row[5], s[BLUR_N, k])
             cover *= strip(s[EAST, k], row[6], row[7], s[BLUR_E, k])

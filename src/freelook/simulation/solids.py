@@ -62,13 +62,9 @@ def _wall(row, glyphs, face, u, v, bu, bv, u0, du, dv, t, softness):  # type: ig
         return dashes(v - row[9], F(18), bv), F(0)
     if int(row[18]) != face:
         return F(0), F(0)
-    # seen from outside, right is east on the south face and so on round the compass
-    right = F(1) if face == SOUTH_FACE or face == EAST_FACE else F(-1)
-    if face == EAST_FACE or face == WEST_FACE:
-        middle = row[0]
-        right = F(1) if face == EAST_FACE else F(-1)
-    else:
-        middle = row[1]
+    # seen from outside, u (north or east) runs to the right on the south and the east face
+    right = F(1) if face in (SOUTH_FACE, EAST_FACE) else F(-1)
+    middle = row[0] if face in (EAST_FACE, WEST_FACE) else row[1]
     size = F(0.72) * (row[9] - row[8])
     x, y = right * (u - middle) / size, (row[2] - v) / size
     index = int(row[17])

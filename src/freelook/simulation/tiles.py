@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from .shading import BLUE, DD, DE, DN, GREEN, LOWEST, RED, ROWS, shade_ground, s
 from .solids import shade_solids
 
 F = np.float32
+Floats = NDArray[np.floating[Any]]
 SIDE = 16
 TILE = SIDE * SIDE
 
@@ -61,7 +62,7 @@ class View(NamedTuple):
     cones: Float32s
 
 
-def make_tiles(rays: NDArray[np.floating], valid: NDArray[np.bool_]) -> RayTiles:
+def make_tiles(rays: Floats, valid: NDArray[np.bool_]) -> RayTiles:
     """Tiles of unit rays (tiles, 256, 3); a tile without a valid ray costs nothing later."""
     weights = valid[..., None].astype(float)
     axis = (rays * weights).sum(axis=1)
@@ -76,7 +77,7 @@ def make_tiles(rays: NDArray[np.floating], valid: NDArray[np.bool_]) -> RayTiles
 
 
 def make_view(
-    landscape: Landscape, position: NDArray[np.floating], world_from_rays: Float32s, softness: float
+    landscape: Landscape, position: Floats, world_from_rays: Floats, softness: float
 ) -> View:
     """What all tiles of one picture share; `softness` in radians."""
     rows = landscape.scene.rows[landscape.scene.flat :]
