@@ -12,9 +12,54 @@ F32 = NDArray[np.float32]
 FAR = np.float32(4.0)  # rays are followed to this many times t_max, then held: all black anyway
 
 
+TOLERANCE_PX = np.float32(0.005)
+COARSEST, FINEST = 16, 2  # view pixels between nodes
+RIM = np.float32(0.98)  # of t_max: below it, no pixel of the view is feathered
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def fill_band(
+    first_row: int,
+    size: tuple[int, int],
+    focal_px: float,
+    camera_from_view: F32,
+    g: F32,
+    t_max: Any,
+    center: F32,
+    stretch: F32,
+    luma: F32,
+    chroma: F32,
+) -> bool:
+    """Coordinates for a band of a view of `size` (width, height) that starts at `first_row`.
+
+    luma (3, rows, columns) gets where each pixel looks, x and y in pixels of the picture, and
+    its t; chroma the same for planes half as large, in their pixels; chroma may be empty. t is
+    left alone unless the return value is true: then the rim of the field is in the band.
+
+    The exact projection is made at nodes 16 view pixels apart, or less where cubics between
+    them would stray by more than the tolerance.
+    """
+    step = COARSEST
+    rows = luma.shape[1]
+    while True:
+        nodes = np.empty((3, (rows - 1) // step + 4, (size[0] - 1) // step + 4), np.float32)
+        project_nodes(
+            nodes, first_row, step, size, focal_px, camera_from_view, g, t_max, center, stretch
+        )
+        if step == FINEST or interpolation_error(nodes, t_max) <= TOLERANCE_PX:
+            break
+        step //= 2
+    rim = nodes[2].max() > t_max * RIM
+    expand(nodes, step, 1, 3 if rim else 2, luma)
+    if chroma.size:
+        expand(nodes, step, 2, 3 if rim else 2, chroma)
+    return bool(rim)
+
+
 @numba.njit(cache=True, nogil=True, fastmath=True)
 def project_nodes(
     nodes: F32,
+    first_row: int,
     step: int,
     size: tuple[int, int],
     focal_px: float,
@@ -26,8 +71,8 @@ def project_nodes(
 ) -> None:
     """Fill nodes (3, rows, columns) with pixel x, pixel y and t.
 
-    Node (j, i) stands at view pixel x = step * (i - 1), y = step * (j - 1): one ring
-    of nodes more than the view, for cubic interpolation.
+    Node (j, i) stands at view pixel x = step * (i - 1), y = first_row + step * (j - 1): one
+    ring of nodes more than the band, for cubic interpolation.
     """
     f32 = np.float32
     cx, cy, focal = f32((size[0] - 1) / 2), f32((size[1] - 1) / 2), f32(focal_px)
@@ -35,7 +80,7 @@ def project_nodes(
     last = f32(len(g) - 1)
     far = FAR * t_max
     for row in range(nodes.shape[1]):
-        y = (f32((row - 1) * step) - cy) / focal
+        y = (f32(first_row + (row - 1) * step) - cy) / focal
         for column in range(nodes.shape[2]):
             x = (f32((column - 1) * step) - cx) / focal
             dx = r[0, 0] * x + r[0, 1] * y + r[0, 2]
@@ -92,26 +137,21 @@ def interpolation_error(nodes: F32, t_max: float) -> float:
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
-def expand(nodes: F32, first_row: int, step: int, scale: int, maps: F32) -> None:
-    """Coordinates for a band of rows of a plane `scale` times smaller than luma.
+def expand(nodes: F32, step: int, scale: int, values: int, maps: F32) -> None:
+    """From nodes to the middle of every pixel of a plane `scale` times smaller than luma.
 
-    nodes (3, ...) as from `project_nodes`; `first_row` is the band's first view row, a multiple
-    of `step`, itself a multiple of `scale`. maps (2 or 3, rows, columns) gets x and y in pixels
-    of the smaller plane, and t, at the middle of each plane pixel.
-
-    Along the rows of nodes first, then down between them: the long inner loops run over
-    contiguous memory.
+    The first `values` of x, y and t are filled in. Along the rows of nodes first, then down
+    between them: the long inner loops run over contiguous memory.
     """
-    first_cell = first_row // step
     per_cell = step // scale
     cells = (maps.shape[1] - 1) // per_cell + 1
     shift = np.float32((scale - 1) / 2 / step)
     wide = np.empty((cells + 3, maps.shape[2]), np.float32)
-    for k in range(len(maps)):
+    for k in range(values):
         gain = np.float32(1 / scale) if k < 2 else np.float32(1)
         offset = np.float32((1 - scale) / 2 / scale) if k < 2 else np.float32(0)
         for j in range(cells + 3):
-            widen(nodes[k, first_cell + j], step, scale, gain, offset, wide[j])
+            widen(nodes[k, j], step, scale, gain, offset, wide[j])
         for cell in range(cells):
             a, b, c, d = wide[cell], wide[cell + 1], wide[cell + 2], wide[cell + 3]
             first = cell * per_cell

@@ -1,0 +1,212 @@
+"""What a moving view costs, beside OpenCV's and ffmpeg's ways and the pure resampling cost.
+
+Every round renders one pose in each way, in changing order, from pictures that were not touched
+by the way before, so that caches favour nobody. ffmpeg is a process of its own: its time is the
+difference between runs with and without the filter, per frame.
+"""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import cv2
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from ..camera import Camera, make_camera
+from ..lens import Equidistant
+from ..renderers.cpu import CpuRenderer, coordinates
+from ..rotations import RDF_FROM_FRD, body_from_view
+from ..types import Picture, Plane
+from ..viewport import Viewport
+
+FIELD_DEG = 188.0
+PICTURES = 4  # more bytes than the caches hold, as with a live decoder
+
+
+@dataclass(frozen=True)
+class Case:
+    """A view of `view_size` at 90 degrees out of a fisheye picture of `picture_size`."""
+
+    name: str
+    picture_size: tuple[int, int]
+    view_size: tuple[int, int]
+
+
+CASES = (
+    Case("720p view out of 2880x2160", (2880, 2160), (1280, 720)),
+    Case("1080p view out of 3840x2160", (3840, 2160), (1920, 1080)),
+)
+
+
+@dataclass
+class Timing:
+    """Milliseconds per view of one way; `skipped` says why there are none."""
+
+    way: str
+    times_ms: list[float] = field(default_factory=list)
+    skipped: str | None = None
+
+    def percentile_ms(self, percent: float) -> float:
+        return float(np.percentile(self.times_ms, percent))
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What all ways render from."""
+
+    camera: Camera
+    viewport: Viewport
+    i420: list[Picture]
+    bgr: list[Plane]
+
+
+OURS, FLOOR, OPENCV, FFMPEG = (
+    "freelook",
+    "floor: cv2.remap alone, map given",
+    "OpenCV: map rebuilt for each pose, BGR",
+    "ffmpeg v360, yaw and pitch commanded",
+)
+
+
+def run(case: Case, rounds: int, threads: int, on_round: Callable[[], None]) -> list[Timing]:
+    """Time every way for `rounds` poses on `threads` cores; ours first."""
+    cv2.setNumThreads(threads)
+    scene = make_scene(case)
+    renderer = CpuRenderer(threads)
+    ours, floor, opencv = Timing(OURS), Timing(FLOOR), Timing(OPENCV)
+    for index, rotation in enumerate(poses(rounds + 3)):
+        ways = [
+            (ours, _ours(renderer, scene, rotation, index)),
+            (floor, _floor(scene, rotation, index + 1)),
+            (opencv, _opencv(scene, rotation, index)),
+        ]
+        for way in range(len(ways)):
+            timing, work = ways[(way + index) % len(ways)]
+            start = time.perf_counter()
+            work()
+            if index >= 3:  # the first rounds compile and warm up
+                timing.times_ms.append((time.perf_counter() - start) * 1e3)
+        on_round()
+    return [ours, floor, opencv, ffmpeg_v360(case, threads)]
+
+
+def make_scene(case: Case) -> Scene:
+    """Smooth random pictures and an equidistant lens whose circle fits the picture's height."""
+    width, height = case.picture_size
+    rng = np.random.default_rng(0)
+
+    def plane(columns: int, rows: int) -> Plane:
+        coarse = rng.integers(0, 256, (rows // 16, columns // 16), dtype=np.uint8)
+        smooth: Plane = cv2.resize(coarse, (columns, rows), interpolation=cv2.INTER_CUBIC)
+        return smooth
+
+    half = (width // 2, height // 2)
+    i420 = [
+        Picture("i420", (plane(width, height), plane(*half), plane(*half))) for _ in range(PICTURES)
+    ]
+    bgr = [cv2.merge([picture.planes[0]] * 3) for picture in i420]
+    lens = Equidistant(height / 2 / np.radians(FIELD_DEG / 2))
+    camera = make_camera(case.picture_size, lens, field_deg=FIELD_DEG)
+    return Scene(camera, Viewport(case.view_size, 90.0), i420, bgr)
+
+
+def poses(count: int) -> Iterator[Rotation]:
+    """camera_from_view of a head that looks around smoothly, new in every frame."""
+    for i in range(count):
+        yield RDF_FROM_FRD * body_from_view(20 * np.sin(i / 15), 10 * np.cos(i / 15), 0.0)
+
+
+def _ours(
+    renderer: CpuRenderer, scene: Scene, camera_from_view: Rotation, index: int
+) -> Callable[[], None]:
+    picture = scene.i420[index % PICTURES]
+
+    def work() -> None:
+        renderer.render(picture, scene.camera, camera_from_view, scene.viewport)
+
+    return work
+
+
+def _floor(scene: Scene, camera_from_view: Rotation, index: int) -> Callable[[], None]:
+    """Nothing but sampling: the maps of this very pose lie ready, fresh in the cache."""
+    picture = scene.i420[index % PICTURES]
+    luma = coordinates(scene.camera, camera_from_view, scene.viewport)
+    chroma = np.ascontiguousarray(luma[:, ::2, ::2] / 2)
+
+    def work() -> None:
+        for index, plane in enumerate(picture.planes):
+            maps = chroma if index else luma
+            cv2.remap(plane, maps[0], maps[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
+
+    return work
+
+
+def _opencv(scene: Scene, camera_from_view: Rotation, index: int) -> Callable[[], None]:
+    """The documented way: initUndistortRectifyMap for the pose, then remap the BGR picture."""
+    picture = scene.bgr[index % PICTURES]
+    width, height = scene.viewport.size
+    f = getattr(scene.camera.lens, "f")  # noqa: B009 - the bench's lens has one
+    (cx, cy), focal = scene.camera.center, scene.viewport.focal_px
+    k = np.array([[f, 0, cx], [0, f, cy], [0, 0, 1.0]])
+    p = np.array([[focal, 0, (width - 1) / 2], [0, focal, (height - 1) / 2], [0, 0, 1.0]])
+    view_from_camera = camera_from_view.inv().as_matrix()
+
+    def work() -> None:
+        x, y = cv2.fisheye.initUndistortRectifyMap(
+            k, np.zeros(4), view_from_camera, p, (width, height), cv2.CV_16SC2
+        )
+        cv2.remap(picture, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
+
+    return work
+
+
+def ffmpeg_v360(case: Case, threads: int, frames: int = 12, repeats: int = 3) -> Timing:
+    """ffmpeg's filter on the same sizes; yaw and pitch change with every frame."""
+    timing = Timing(FFMPEG)
+    program = shutil.which("ffmpeg")
+    if program is None:
+        timing.skipped = "ffmpeg is not installed"
+        return timing
+    with tempfile.TemporaryDirectory() as folder:
+        commands = Path(folder) / "commands"
+        commands.write_text(_v360_commands(frames))
+        width, height = case.view_size
+        v360 = (
+            f"sendcmd=f={commands},v360=input=fisheye:ih_fov={FIELD_DEG}:iv_fov={FIELD_DEG}"
+            f":output=flat:h_fov=90:v_fov=58.7:w={width}:h={height}:interp=linear"
+        )
+        for _ in range(repeats):
+            try:
+                with_filter = _ffmpeg_seconds(program, case, frames, threads, v360)
+                without = _ffmpeg_seconds(program, case, frames, threads, "null")
+            except (subprocess.SubprocessError, OSError) as error:
+                timing.skipped = f"ffmpeg failed: {error}"
+                return timing
+            timing.times_ms.append((with_filter - without) / frames * 1e3)
+    return timing
+
+
+def _v360_commands(frames: int) -> str:
+    lines = (
+        f"{i / 30:.4f} v360 yaw {20 * np.sin(i / 15):.3f}, v360 pitch {10 * np.cos(i / 15):.3f};"
+        for i in range(frames)
+    )
+    return "\n".join(lines)
+
+
+def _ffmpeg_seconds(program: str, case: Case, frames: int, threads: int, filters: str) -> float:
+    side = case.picture_size[1]  # v360 wants the circle to fill the picture
+    source = f"testsrc2=size={side}x{side}:rate=30"
+    command = [program, "-v", "error", "-nostdin", "-filter_threads", str(threads)]
+    command += ["-f", "lavfi", "-i", source, "-frames:v", str(frames)]
+    command += ["-vf", f"format=yuv420p,{filters}", "-f", "null", "-"]
+    start = time.perf_counter()
+    subprocess.run(command, check=True, capture_output=True, timeout=300)
+    return time.perf_counter() - start
