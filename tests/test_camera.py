@@ -27,22 +27,23 @@ from freelook.lens import (
 from freelook.rotations import RDF_FROM_FRD
 
 # what each model is commonly used for, all but perspective and orthographic beyond 90 degrees
+FIELDS: list[tuple[Lens, float]] = [
+    (Perspective(300), 130.0),
+    (Stereographic(300), 220.0),
+    (Equidistant(300), 220.0),
+    (Equisolid(300), 220.0),
+    (Orthographic(300), 170.0),
+    (Polynomial(300, -3, 10, -8, 1), 190.0),
+    (KannalaBrandt(300, -0.01, 0.005, -0.002, 0.0003), 200.0),
+]
 CAMERAS: dict[str, Camera] = {
     model_name(lens): make_camera((1000, 800), lens, field_deg=field_deg)
-    for lens, field_deg in [
-        (Perspective(300), 130.0),
-        (Stereographic(300), 220.0),
-        (Equidistant(300), 220.0),
-        (Equisolid(300), 220.0),
-        (Orthographic(300), 170.0),
-        (Polynomial(300, -3, 10, -8, 1), 190.0),
-        (KannalaBrandt(300, -0.01, 0.005, -0.002, 0.0003), 200.0),
-    ]
+    for lens, field_deg in FIELDS
 }
 TAKES_MORE_THAN_A_HALF_SPACE = set(MODELS) - {"perspective", "orthographic"}
 
 
-@pytest.fixture(params=CAMERAS.values(), ids=CAMERAS.keys())
+@pytest.fixture(params=list(CAMERAS.values()), ids=list(CAMERAS))
 def camera(request: pytest.FixtureRequest) -> Camera:
     made: Camera = request.param
     return made

@@ -83,7 +83,7 @@ def test_a_mount_is_where_the_camera_looks() -> None:
 def test_written_profiles_are_read_back_the_same(model: str) -> None:
     camera = make_camera(
         (1000, 800),
-        MODELS[model](300.0),
+        MODELS[model](300.0),  # type: ignore[call-arg]
         center=(1.5, 2.25),
         field_deg=150,
         stretch=np.array([[1, 0.1], [0, 0.9]]),

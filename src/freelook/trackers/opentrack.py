@@ -13,14 +13,12 @@ Hence the default `roll=-roll`. Its own settings can turn any axis round, so can
 from __future__ import annotations
 
 import math
-import selectors
-import socket
 import struct
-import threading
 from collections.abc import Iterator, Mapping
 
 from ..axes import LARGEST_DEG, Axis, AxisMap
 from ..clock import Clock
+from ..datagrams import DatagramListener
 from ..errors import TrackerError
 from ..types import Counters, Pose
 
@@ -69,67 +67,46 @@ class OpenTrack:
     def __init__(self, host: str, port: int, axes: AxisMap, clock: Clock) -> None:
         self._axes = axes
         self._clock = clock
-        self._socket = _bind(host, port)
-        self._wake_here, self._wake_there = socket.socketpair()
-        self._lock = threading.Lock()
-        self._reading = False
-        self._closed = False
+        self._listener = _listen(host, port)
         self.counters = Counters()
-        self.address: tuple[str, int] = self._socket.getsockname()[:2]
+        self.address = (host, self._listener.port)
 
     @property
     def message(self) -> str:
-        return f"waiting for OpenTrack packets on UDP {self.address[0]} port {self.address[1]}"
+        host, port = self.address
+        return f"waiting for OpenTrack packets on UDP {host} port {port}"
 
     def poses(self) -> Iterator[Pose]:
-        with self._lock:
-            if self._closed:
-                return
-            self._reading = True
-        with selectors.DefaultSelector() as selector, self._socket, self._wake_here:
-            selector.register(self._socket, selectors.EVENT_READ)
-            selector.register(self._wake_here, selectors.EVENT_READ)
-            while not self._closed:
-                selector.select()
-                angles = self._newest()
-                if angles is not None and not self._closed:
-                    yield Pose(self._axes.body_from_view(*angles), self._clock())
+        while not self._listener.closed:
+            angles = self._newest()
+            if angles is not None:
+                yield Pose(self._axes.body_from_view(*angles), self._clock())
 
     def close(self) -> None:
-        with self._lock:
-            self._closed = True
-            self._wake_there.close()
-            if not self._reading:  # else the reader wakes up and closes them
-                self._socket.close()
-                self._wake_here.close()
+        self._listener.close()
 
     def _newest(self) -> tuple[float, float, float] | None:
+        """Waits for a datagram, then empties the socket; None if nothing in it was valid."""
         newest = None
+        datagram = self._listener.receive()
         for _ in range(LARGEST_BURST):
-            try:
-                datagram = self._socket.recv(2048)
-            except BlockingIOError:
+            if datagram is None:
                 break
             self.counters.add("received")
             angles = parse_packet(datagram, self.counters)
-            if angles is not None:
-                if newest is not None:
-                    self.counters.add("dropped")
-                newest = angles
+            if angles is not None and newest is not None:
+                self.counters.add("dropped")
+            newest = angles or newest
+            datagram = self._listener.receive(timeout_s=0)
         return newest
 
 
-def _bind(host: str, port: int) -> socket.socket:
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    udp = socket.socket(family, socket.SOCK_DGRAM)
+def _listen(host: str, port: int) -> DatagramListener:
     try:
-        udp.bind((host, port))
-    except (OSError, UnicodeError) as error:
-        udp.close()
+        return DatagramListener(host, port)
+    except (OSError, ValueError) as error:  # ValueError: text that cannot be a host's name
         reason = getattr(error, "strerror", None) or error
         raise TrackerError(
             f"cannot listen on UDP {host} port {port}: {reason}; "
             "is another program using the port, or is the address not one of this machine?"
         ) from None
-    udp.setblocking(False)
-    return udp

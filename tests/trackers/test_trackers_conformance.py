@@ -1,0 +1,197 @@
+"""What every tracker must do. A new one is tested here once `STAND_INS` knows how to feed it."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import socket
+import struct
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from freelook.axes import AXES
+from freelook.clock import now_ns
+from freelook.errors import TrackerError
+from freelook.rotations import head_angles_deg
+from freelook.trackers import known_trackers, open_tracker
+from freelook.types import Pose, Tracker
+
+Feed = Callable[[Tracker], None]
+StandIn = tuple[str, Feed]
+
+
+def feed_nothing(tracker: Tracker) -> None:
+    pass
+
+
+def opentrack_stand_in(tmp_path: Path) -> StandIn:
+    def feed(tracker: Tracker) -> None:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
+            out.sendto(struct.pack("<6d", 0, 0, 0, 30, 20, -10), tracker.address)  # type: ignore[attr-defined]
+
+    return "opentrack:127.0.0.1:0", feed
+
+
+def file_stand_in(tmp_path: Path) -> StandIn:
+    path = tmp_path / "angles.txt"
+    count = itertools.count()
+
+    def feed(tracker: Tracker) -> None:
+        path.write_text("10 20 30\n")
+        os.utime(path, ns=(0, next(count) * 1_000_000_000))
+
+    return f"file:{path}", feed
+
+
+def script_stand_in(tmp_path: Path) -> StandIn:
+    path = tmp_path / "poses.csv"
+    path.write_text("t_s,yaw_deg,pitch_deg,roll_deg\n0,30,20,10\n")
+    return f"script:{path}?loop=1", feed_nothing
+
+
+def wander_stand_in(tmp_path: Path) -> StandIn:
+    return "wander", feed_nothing
+
+
+STAND_INS: dict[str, Callable[[Path], StandIn]] = {
+    "file": file_stand_in,
+    "opentrack": opentrack_stand_in,
+    "script": script_stand_in,
+    "wander": wander_stand_in,
+}
+
+
+@pytest.fixture(params=sorted(STAND_INS))
+def stand_in(request: pytest.FixtureRequest, tmp_path: Path) -> StandIn:
+    return STAND_INS[request.param](tmp_path)
+
+
+@pytest.fixture
+def tracker(stand_in: StandIn) -> Iterator[Tracker]:
+    made = open_tracker(stand_in[0])
+    yield made
+    made.close()
+
+
+def read_some(tracker: Tracker, feed: Feed, count: int) -> list[Pose]:
+    poses = []
+    feed(tracker)
+    for pose in tracker.poses():
+        poses.append(pose)
+        if len(poses) == count:
+            break
+        feed(tracker)
+    return poses
+
+
+def test_every_tracker_is_tested_here() -> None:
+    assert set(STAND_INS) == set(known_trackers())
+
+
+def test_every_tracker_has_its_line_of_documentation_and_its_options() -> None:
+    for kind, module in known_trackers().items():
+        assert len((module.__doc__ or "").splitlines()[0]) > 20, kind
+        assert not set(module.OPTIONS) & set(AXES), kind
+
+
+def test_poses_come_with_their_arrival_times_on_the_given_clock(
+    tracker: Tracker, stand_in: StandIn
+) -> None:
+    before = now_ns()
+    poses = read_some(tracker, stand_in[1], 3)
+    times = [pose.t_ns for pose in poses]
+    assert before <= times[0] <= times[1] <= times[2] <= now_ns()
+    assert tracker.counters["received"] >= 3
+
+
+def test_a_waiting_tracker_says_so(tracker: Tracker) -> None:
+    assert len(tracker.message) > 5
+
+
+def test_close_from_another_thread_ends_poses_at_once(
+    tracker: Tracker, wait_until: Callable[..., None]
+) -> None:
+    reader = threading.Thread(target=lambda: list(tracker.poses()))
+    reader.start()
+    start = time.monotonic()
+    tracker.close()
+    reader.join(5)
+    assert not reader.is_alive()
+    assert time.monotonic() - start < 1.0
+
+
+def test_close_may_come_first_and_often(tracker: Tracker) -> None:
+    tracker.close()
+    tracker.close()
+    assert list(tracker.poses()) == []
+
+
+@pytest.mark.parametrize("kind", ["file", "opentrack", "script"])
+def test_axes_can_be_changed(kind: str, tmp_path: Path) -> None:
+    spec, feed = STAND_INS[kind](tmp_path)
+    mark = "&" if "?" in spec else "?"
+    tracker = open_tracker(f"{spec}{mark}yaw=-yaw&pitch=yaw*0.5&roll=0")
+    try:
+        (pose,) = read_some(tracker, feed, 1)
+    finally:
+        tracker.close()
+    assert head_angles_deg(pose.body_from_view) == pytest.approx((-30, 15, 0))
+
+
+@pytest.mark.parametrize("kind", ["file", "opentrack", "script"])
+def test_the_same_head_is_the_same_pose_whatever_the_tracker(kind: str, tmp_path: Path) -> None:
+    """Right, up and right ear down by 30, 20 and 10 degrees, each in its tracker's own signs."""
+    spec, feed = STAND_INS[kind](tmp_path)
+    tracker = open_tracker(spec)
+    try:
+        (pose,) = read_some(tracker, feed, 1)
+    finally:
+        tracker.close()
+    assert head_angles_deg(pose.body_from_view) == pytest.approx((30, 20, 10))
+
+
+@pytest.mark.parametrize(
+    ("spec", "words"),
+    [
+        ("", "unknown tracker ''.*known: file, opentrack, script, wander"),
+        ("kinect:3", "unknown tracker 'kinect' in 'kinect:3'; known: file"),
+        ("wander?speed=3", "tracker wander: unknown option 'speed'; known: rate, yaw, pitch, roll"),
+        ("wander?rate", "'rate' in 'wander.rate' is not an option; write name=value"),
+        ("wander?rate=5&rate=6", "option 'rate' is given twice"),
+        ("wander?rate=0", "tracker wander: rate must be a number from 1 to 1000, not '0'"),
+        ("wander?rate=nan", "rate must be a number from 1 to 1000"),
+        ("wander?yaw=2*yaw", "tracker wander: yaw=2.yaw is not understood"),
+        ("wander:5", "tracker wander: it takes no argument, but was given '5'"),
+        ("opentrack:port", "tracker opentrack: 'port' is not a port or host:port"),
+        ("opentrack:65536", "'65536' is not a port"),
+        ("opentrack:203.0.113.7:4242", "cannot listen on UDP 203.0.113.7 port 4242: .*another"),
+        ("file", "tracker file: which file"),
+        ("file:/", "is a directory"),
+        ("script", "tracker script: which script"),
+        ("script:/nowhere.csv", "tracker script: pose script /nowhere.csv: No such file"),
+        ("script:/nowhere.csv?loop=yes", "loop must be 0 or 1, not 'yes'"),
+    ],
+)
+def test_what_cannot_be_opened_is_explained(spec: str, words: str) -> None:
+    with pytest.raises(TrackerError, match=words):
+        open_tracker(spec)
+
+
+words = st.text(max_size=10) | st.sampled_from(["rate=9", "yaw=0", "loop=1", "127.0.0.1:0", "0"])
+
+
+@given(st.sampled_from(sorted(STAND_INS)), words, st.lists(words, max_size=3))
+def test_any_text_is_a_tracker_or_an_error(kind: str, argument: str, options: list[str]) -> None:
+    if not argument.isascii():  # a name that is not ASCII may be looked up on the network
+        argument = argument.encode("ascii", "backslashreplace").decode()
+    try:
+        tracker = open_tracker(f"{kind}:{argument}" + ("?" + "&".join(options) if options else ""))
+    except TrackerError:
+        return
+    tracker.close()
