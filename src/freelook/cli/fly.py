@@ -11,7 +11,7 @@ import asyncio
 import contextlib
 import dataclasses
 import webbrowser
-from collections.abc import Awaitable, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,7 +27,7 @@ from ._progress import StatusLine, say
 
 if TYPE_CHECKING:  # the web libraries are slow to load, and may be missing
     from ..ingest import Ingest
-    from ..web.serving import Door
+    from ..web.serving import Door, Ending
     from ..web.station import About, Station
 
 DEFAULT_PORT = 8042
@@ -119,14 +119,22 @@ def run(args: argparse.Namespace) -> int:
     camera = mounted_camera(args.lens, args.mount)
     ingest = Ingest(lambda: open_source(args.source, loop=args.loop))
     about = About(args.source, False, args.hold, args.ease, args.hfov)
-    fly(args, ingest, camera, about, never())
+    fly(args, ingest, camera, about, never)
     return 0
 
 
 def fly(
-    args: argparse.Namespace, ingest: Ingest, camera: Camera, about: About, until: Awaitable[None]
+    args: argparse.Namespace,
+    ingest: Ingest,
+    camera: Camera,
+    about: About,
+    until: Ending,
+    explain: Callable[[str], str] = lambda _state: "",
 ) -> None:
-    """Serve the page until Ctrl-C or `until`."""
+    """Serve the page until Ctrl-C or until `until` returns or raises.
+
+    `explain(state of the source)` may replace what is printed about the source.
+    """
     from ..web.serving import open_door, serve
     from ..web.station import Station
 
@@ -147,7 +155,7 @@ def fly(
                 station,
                 door,
                 ready=lambda: announce(door, not args.no_browser),
-                report=lambda station: line.show(summary(station)),
+                report=lambda station: line.show(summary(station, explain)),
                 until=until,
             )
         )
@@ -196,12 +204,13 @@ def announce(door: Door, open_browser: bool) -> None:
         webbrowser.open(door.urls[-1])
 
 
-def summary(station: Station) -> str:
+def summary(station: Station, explain: Callable[[str], str]) -> str:
     """The station's state in one line."""
     status = station.status()
     source = status["source"]
     parts = [" ".join(filter(None, (source["state"], source["codec"], _size(source["size"]))))]
-    parts += [source["message"], source["transcoding"] and f"transcoding: {source['transcoding']}"]
+    message = explain(source["state"]) or source["message"]
+    parts += [message, source["transcoding"] and f"transcoding: {source['transcoding']}"]
     parts += [f"{t['name']} {t['state']}" for t in status["trackers"]]
     viewers = status["viewers"]
     parts.append(f"{viewers} viewer{'' if viewers == 1 else 's'}")

@@ -155,7 +155,7 @@ async def _whep_post(request: web.Request) -> web.StreamResponse:
         return web.Response(status=refused.status, text=f"{refused}\n", headers=headers)
     return web.Response(
         status=201,
-        text=answer,
+        body=answer.encode(),
         content_type="application/sdp",
         headers={"Location": f"/whep/{session}", "Cache-Control": "no-store"},
     )

@@ -10,7 +10,7 @@ import signal
 import socket
 import ssl
 import sys
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,6 +26,7 @@ SHUTDOWN_S = 2.0
 ANY_ADDRESS = ("0.0.0.0", "::", "")
 
 Report = Callable[[Station], None]
+Ending = Callable[[], Coroutine[None, None, None]]
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,7 @@ async def serve(
     *,
     ready: Callable[[], None],
     report: Report,
-    until: Awaitable[None],
+    until: Ending,
 ) -> None:
     """Run the station until `until` is done, or this process is asked to stop.
 
@@ -92,8 +93,11 @@ async def serve(
         await runner.cleanup()
 
 
-async def _reporting(station: Station, report: Report, until: Awaitable[None]) -> None:
-    ends = [asyncio.ensure_future(until), asyncio.ensure_future(_asked_to_stop())]
+async def _reporting(station: Station, report: Report, until: Ending) -> None:
+    ending, asked = ends = (
+        asyncio.ensure_future(until()),
+        asyncio.ensure_future(_asked_to_stop()),
+    )
     try:
         while not any(end.done() for end in ends):
             report(station)
@@ -102,8 +106,8 @@ async def _reporting(station: Station, report: Report, until: Awaitable[None]) -
         for end in ends:
             end.cancel()
         await asyncio.gather(*ends, return_exceptions=True)
-    if ends[0].done() and not ends[0].cancelled():
-        ends[0].result()
+    if asked.cancelled():
+        ending.result()
 
 
 async def _asked_to_stop() -> None:
