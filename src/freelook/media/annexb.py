@@ -15,9 +15,10 @@ _PARAMETER_TYPES = {"h264": (7, 8), "hevc": (32, 33, 34)}  # in the order they m
 def split_nals(data: bytes) -> Iterator[bytes]:
     """The NAL units of a byte stream, without start codes; empty ones are left out."""
     starts = [match.end() for match in _START.finditer(data)]
-    for start, following in zip(starts, [*starts[1:], len(data) + 3], strict=True):
+    ends = [start - 3 for start in starts[1:]] + [len(data)]
+    for start, end in zip(starts, ends, strict=False):
         # zeros before a start code are padding: a NAL unit ends in a 1 bit
-        nal = data[start : following - 3].rstrip(b"\0")
+        nal = data[start:end].rstrip(b"\0")
         if nal:
             yield nal
 

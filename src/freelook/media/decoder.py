@@ -47,6 +47,9 @@ class Decoder:
         if not self._started:
             self.counters.add("waiting_for_key")
             return []
+        if not unit.data:  # libavcodec would take it for the end of the stream
+            self.counters.add("undecodable")
+            return []
         packet: av.Packet[Any] = av.Packet(unit.data)
         packet.opaque = (unit.capture_ns, unit.media_ns)
         return self._run(context, packet)
