@@ -12,6 +12,7 @@ from pkgutil import iter_modules
 import numpy as np
 import pytest
 
+import test_layers
 from freelook import cli, formats, lens
 from freelook.camera import make_table
 from freelook.formats import freelook as our_format
@@ -107,6 +108,13 @@ def test_table_errors_in_the_docs_are_the_real_ones() -> None:
         values = {key: float(value) for key, value in re.findall(r"(\w+)=([-\d.]+)", parameters)}
         table = make_table(lens.MODELS[name](**values), float(np.radians(float(half_deg))))
         assert table.residual_px == pytest.approx(float(error_px), abs=6e-5), name
+
+
+def test_layers_in_the_docs_are_those_of_the_code() -> None:
+    text = text_of("design.md").split("## Layers")[1]
+    rows = re.findall(r"^\| (\d) \| (.*?) \|", text, re.M)
+    documented = {int(number): set(re.findall(r"`(\w+)`", names)) for number, names in rows}
+    assert documented == dict(enumerate(test_layers.LAYERS))
 
 
 def test_conventions_are_pinned_by_tests_that_exist() -> None:
