@@ -17,7 +17,7 @@ LAYERS: list[set[str]] = [
     | {"color", "datagrams", "latency"},
     {"renderers", "gimbal", "simulation", "media"},
     {"sources", "trackers", "sinks", "formats"},
-    {"ingest", "head", "session"},
+    {"ingest", "head", "session", "offline"},
     {"cli", "web", "bench", "doctor", "egl"},
 ]
 LAYER_OF = {name: number for number, names in enumerate(LAYERS) for name in names}
