@@ -38,6 +38,10 @@ def only_viewer(station: Bench) -> Viewer:
     return viewer
 
 
+def has_idr(unit: tuple[int, bytes]) -> bool:
+    return any(nal[0] & 31 == 5 for nal in split_nals(unit[1]))
+
+
 @pytest.fixture
 def received(monkeypatch: pytest.MonkeyPatch) -> Units:
     """(RTP time stamp, Annex B) of each coded picture a client got, before decoding."""
@@ -137,7 +141,7 @@ def test_poses_arrive_within_milliseconds() -> None:
         for yaw in range(40):
             station.trackers["script"].pose(Pose(body_from_view(float(yaw), 0.0), now_ns()))
             seen = len(viewer.of_type("pose"))
-            await until(lambda seen=seen: len(viewer.of_type("pose")) > seen, "pose", 2.0)
+            await viewer.more("pose", seen)
             delays_ms.append((now_ns() - viewer.last("pose")["t"]) / 1e6)
         assert np.median(delays_ms) < 20  # with `until` looking every 5 ms
         last = viewer.last("pose")
@@ -320,8 +324,7 @@ def test_a_lost_picture_of_transcoded_video_makes_a_key_picture(received: Units)
             [ssrc] = receiver._RTCRtpReceiver__remote_streams
             count = len(received)
             await receiver._send_rtcp_pli(ssrc)
-            is_key = lambda data: any(nal[0] & 31 == 5 for nal in split_nals(data))  # noqa: E731
-            await until(lambda: any(is_key(d) for _, d in received[count : count + 10]), "key")
+            await until(lambda: any(map(has_idr, received[count : count + 10])), "key picture")
             assert only_viewer(station).counters["replays"] <= 1
             await viewer.close()
 

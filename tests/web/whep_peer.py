@@ -166,6 +166,10 @@ class Peer:
         found = self.of_type(kind)
         return found[-1] if found else {}
 
+    async def more(self, kind: str, than: int) -> None:
+        """Wait for the next message of a kind."""
+        await until(lambda: len(self.of_type(kind)) > than, f"{kind} message", 2.0)
+
     async def close(self) -> None:
         await self.pc.close()
         if self._reader is not None:

@@ -10,6 +10,8 @@ import argparse
 import asyncio
 import contextlib
 import dataclasses
+import math
+import threading
 import webbrowser
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -23,6 +25,7 @@ from ..head import Head
 from ..rotations import body_from_view
 from ..trackers import known_trackers, open_tracker
 from ..viewport import Viewport
+from ._arguments import three_angles
 from ._progress import StatusLine, say
 
 if TYPE_CHECKING:  # the web libraries are slow to load, and may be missing
@@ -49,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--loop", action="store_true", help="play a recording over and over")
     parser.add_argument(
         "--mount",
-        type=_three_angles,
+        type=three_angles,
         metavar="YAW,PITCH,ROLL",
         help="how the camera is fixed to the vehicle, degrees right, up, right side down "
         "(write --mount=-10,0,0 with a leading minus)",
@@ -139,26 +142,26 @@ def fly(
     from ..web.station import Station
 
     Viewport((16, 9), about.hfov_deg)  # says what is wrong with it
-    heads = open_heads(args.tracker, GimbalSettings(hold_s=about.hold_s, ease_s=about.ease_s))
-    door = open_door(
-        args.host,
-        args.port,
-        token=args.token,
-        tls=args.tls,
-        certificate=args.cert,
-        key=args.key,
-    )
-    station = Station(ingest, camera, heads, about)
-    with StatusLine() as line:
-        asyncio.run(
-            serve(
-                station,
-                door,
-                ready=lambda: announce(door, not args.no_browser),
-                report=lambda station: line.show(summary(station, explain)),
-                until=until,
-            )
+    settings = GimbalSettings(hold_s=about.hold_s, ease_s=about.ease_s)
+    with contextlib.ExitStack() as opened, StatusLine() as line:
+        heads = open_heads(args.tracker, settings, opened)
+        door = open_door(
+            args.host,
+            args.port,
+            token=args.token,
+            tls=args.tls,
+            certificate=args.cert,
+            key=args.key,
         )
+        opened.enter_context(door.socket)
+        serving = serve(
+            Station(ingest, camera, heads, about),
+            door,
+            ready=lambda: announce(door, not args.no_browser),
+            report=lambda station: line.show(summary(station, explain)),
+            until=until,
+        )
+        asyncio.run(serving)
 
 
 def mounted_camera(lens: str | None, mount: Sequence[float] | None) -> Camera:
@@ -171,20 +174,20 @@ def mounted_camera(lens: str | None, mount: Sequence[float] | None) -> Camera:
     camera = load_camera(lens)
     if mount is None:
         return camera
+    if not all(map(math.isfinite, mount)):
+        raise FreelookError(f"--mount takes three angles in degrees, not {mount}")
     return dataclasses.replace(camera, camera_from_body=body_from_view(*mount).inv())
 
 
-def open_heads(specs: Sequence[str], settings: GimbalSettings) -> dict[str, Head]:
+def open_heads(
+    specs: Sequence[str], settings: GimbalSettings, opened: contextlib.ExitStack
+) -> dict[str, Head]:
     """Heads by name: the tracker's kind, numbered from the second of a kind on."""
     heads: dict[str, Head] = {}
-    try:
-        for spec in specs:
-            name = _free_name(spec.partition(":")[0].partition("?")[0], heads)
-            heads[name] = Head(name, open_tracker(spec), Gimbal(settings))
-    except BaseException:
-        for head in heads.values():
-            head.close()
-        raise
+    for spec in specs:
+        name = _free_name(spec.partition(":")[0].partition("?")[0], heads)
+        heads[name] = Head(name, open_tracker(spec), Gimbal(settings))
+        opened.callback(heads[name].close)
     return heads
 
 
@@ -201,7 +204,7 @@ def announce(door: Door, open_browser: bool) -> None:
     if door.tls is not None:
         say("the browser will warn of a certificate it does not know, unless you gave a known one")
     if open_browser and can_open_browser():
-        webbrowser.open(door.urls[-1])
+        threading.Thread(target=webbrowser.open, args=(door.urls[-1],), daemon=True).start()
 
 
 def summary(station: Station, explain: Callable[[str], str]) -> str:
@@ -223,15 +226,3 @@ def _size(size: Sequence[int] | None) -> str:
 
 async def never() -> None:
     await asyncio.Event().wait()
-
-
-def _three_angles(text: str) -> tuple[float, float, float]:
-    try:
-        yaw, pitch, roll = (float(part) for part in text.split(","))
-    except ValueError:
-        raise argparse.ArgumentTypeError(
-            f"expected three angles like 0,-15,0, not '{text}'"
-        ) from None
-    if not all(abs(angle) <= 360 for angle in (yaw, pitch, roll)):
-        raise argparse.ArgumentTypeError(f"angles must lie within 360 degrees, not '{text}'")
-    return yaw, pitch, roll
