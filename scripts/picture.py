@@ -11,6 +11,7 @@ from freelook import Camera, Viewport, body_from_view, load_camera
 from freelook.renderers.cpu import CpuRenderer
 from freelook.simulation.camera import SimulatedCamera
 from freelook.simulation.world import World
+from freelook.sinks.picture import rgb24
 from freelook.types import Picture
 
 FLIGHT_S = 68.4
@@ -23,9 +24,7 @@ OUTLINE_BGR = (60, 200, 255)
 
 
 def bgr(picture: Picture) -> np.ndarray:
-    """An I420 picture for OpenCV's file writer (BT.601 there; close enough for a picture)."""
-    rows = np.vstack([plane.reshape(-1, picture.size[0]) for plane in picture.planes])
-    return cv2.cvtColor(rows, cv2.COLOR_YUV2BGR_I420)
+    return np.ascontiguousarray(rgb24(picture)[..., ::-1])
 
 
 def outline(camera: Camera, viewport: Viewport) -> np.ndarray:
