@@ -66,6 +66,20 @@ class FileSource:
         """What the container says about the video."""
         return self._info
 
+    @property
+    def frames_per_s(self) -> float:
+        """The average rate, or 30 where the file does not say."""
+        return NS_PER_S / self._frame_ns
+
+    @property
+    def expected_frames(self) -> int | None:
+        """How many pictures the file claims to hold; None if it does not say."""
+        if self._stream.frames:
+            return int(self._stream.frames)
+        if self._container.duration is None:
+            return None
+        return round(self._container.duration / av.time_base * self.frames_per_s)
+
     def units(self) -> Iterator[AccessUnit]:
         self._start_ns = self._due_ns = self._clock()
         try:

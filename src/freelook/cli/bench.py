@@ -1,0 +1,89 @@
+"""Measure this machine: `bench render` (cost of a view) and `bench latency` (head to picture).
+
+Everything is measured side by side in one run with what you might use instead; what is not
+installed is named as skipped.
+
+  freelook bench render                  the two standard cases on all cores
+  freelook bench render --threads 1      on one core
+  freelook bench latency                 needs a browser; takes about a minute
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ..bench.render import Timing
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    what = parser.add_subparsers(dest="what", metavar="WHAT", required=True)
+    render = what.add_parser("render", help="what a moving view costs, beside OpenCV and ffmpeg")
+    render.add_argument("--rounds", type=int, default=100, metavar="N", help="views per way")
+    render.add_argument(
+        "--threads", type=int, default=os.cpu_count() or 1, metavar="N", help="cores to use"
+    )
+    render.add_argument("--json", action="store_true", help="print the figures as JSON")
+    render.set_defaults(bench=_render)
+    latency = what.add_parser("latency", help="stamp to picture, head to changed picture")
+    latency.add_argument("--seconds", type=float, default=10.0, metavar="S", help="for each part")
+    latency.add_argument("--json", action="store_true", help="print the figures as JSON")
+    latency.set_defaults(bench=_latency)
+
+
+def run(args: argparse.Namespace) -> int:
+    return int(args.bench(args))
+
+
+def _render(args: argparse.Namespace) -> int:
+    from rich.console import Console
+
+    from ..bench.render import CASES, run
+    from ._bars import bar
+
+    figures = {}
+    for case in CASES:
+        with bar(case.name, args.rounds + 3, "views", quiet=args.json) as advance:
+            timings = run(case, args.rounds, args.threads, advance)
+        if not args.json:
+            Console().print(_table(case.name, args.threads, timings))
+        figures[case.name] = [_figures(timing, timings[0]) for timing in timings]
+    if args.json:
+        print(json.dumps({"threads": args.threads, "cases": figures}, indent=2))
+    return 0
+
+
+def _table(title: str, threads: int, timings: list[Timing]) -> Any:
+    from rich.table import Table
+
+    table = Table(title=f"{title}, {threads} thread{'s' if threads > 1 else ''}")
+    table.add_column("way")
+    for column in ("median ms", "p95 ms", "times freelook"):
+        table.add_column(column, justify="right")
+    for timing in timings:
+        row = _figures(timing, timings[0])
+        if timing.skipped:
+            table.add_row(timing.way, f"skipped: {timing.skipped}", "", "")
+        else:
+            cells = [f"{row[key]:.2f}" for key in ("median_ms", "p95_ms", "times_ours")]
+            table.add_row(timing.way, *cells)
+    return table
+
+
+def _figures(timing: Timing, ours: Timing) -> dict[str, Any]:
+    if timing.skipped:
+        return {"way": timing.way, "skipped": timing.skipped}
+    median = timing.percentile_ms(50)
+    return {
+        "way": timing.way,
+        "median_ms": median,
+        "p95_ms": timing.percentile_ms(95),
+        "times_ours": median / ours.percentile_ms(50),
+    }
+
+
+def _latency(args: argparse.Namespace) -> int:
+    raise NotImplementedError

@@ -1,0 +1,143 @@
+"""Render the view into a recording or a picture: look around afterwards.
+
+  freelook render flight.mp4 left.mp4 --lens cam.json --yaw -35 --pitch 20 --hfov 80
+  freelook render flight.mp4 view.mp4 --lens cam.json --poses head.csv --size 1920x1080
+  freelook render shot.png view.png --lens cam.json --yaw 30
+
+Frame times and sound are kept. Interrupted with Ctrl-C, what was written plays.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import os
+import sys
+from collections.abc import Iterable
+
+from ..camera import Camera
+from ..errors import FreelookError, SourceError
+from ..mailbox import Mailbox
+from ..pose_script import read_script
+from ..rotations import body_from_view
+from ..session import Aim, Session
+from ..types import ColorSpace, Frame
+from ..viewport import Viewport
+from ._arguments import size, three_angles
+from ._cameras import LENS_HELP, MOUNT_HELP, mounted_camera
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("input", metavar="IN", help="a video file or a picture")
+    parser.add_argument("output", metavar="OUT", help="a video file (.mp4, .mkv) or a picture")
+    parser.add_argument("--lens", metavar="PROFILE", help=LENS_HELP)
+    parser.add_argument("--mount", type=three_angles, metavar="YAW,PITCH,ROLL", help=MOUNT_HELP)
+    for name, to in (("yaw", "right"), ("pitch", "up"), ("roll", "right ear down")):
+        parser.add_argument(
+            f"--{name}", type=float, default=0.0, metavar="DEG", help=f"look this far {to}"
+        )
+    parser.add_argument(
+        "--poses",
+        metavar="CSV",
+        help="follow these poses instead: t_s,yaw_deg,pitch_deg,roll_deg or t_s,qw,qx,qy,qz, "
+        "with times from the first frame",
+    )
+    parser.add_argument(
+        "--hfov", type=float, default=90.0, metavar="DEG", help="horizontal field of view, 10-150"
+    )
+    parser.add_argument(
+        "--size", type=size, default=(1280, 720), metavar="WxH", help="of the view (1280x720)"
+    )
+    parser.add_argument("--overwrite", action="store_true", help="replace OUT if it exists")
+
+
+def run(args: argparse.Namespace) -> int:
+    from ..media.pictures import is_picture
+
+    camera = mounted_camera(args.lens, args.mount)
+    viewport = Viewport(args.size, args.hfov)
+    aim = _aim(args)
+    if os.path.realpath(args.input) == os.path.realpath(args.output):
+        raise FreelookError("IN and OUT are the same file; name another OUT")
+    if is_picture(args.input):
+        _render_picture(args, camera, aim, viewport)
+    else:
+        _render_video(args, camera, aim, viewport)
+    return 0
+
+
+def _aim(args: argparse.Namespace) -> Aim:
+    if args.poses is None:
+        fixed = body_from_view(args.yaw, args.pitch, args.roll)
+        return lambda _now_ns: fixed
+    if args.yaw or args.pitch or args.roll:
+        raise FreelookError("give either --poses or --yaw, --pitch and --roll, not both")
+    return read_script(args.poses).pose_at
+
+
+def _render_picture(args: argparse.Namespace, camera: Camera, aim: Aim, viewport: Viewport) -> None:
+    from ..media.pictures import is_picture, read_picture
+
+    if not is_picture(args.output):
+        raise FreelookError(f"IN is a picture, so OUT must be one too, not {args.output}")
+    frame = read_picture(args.input)
+    _write(args, [frame], camera, aim, viewport, total=1, color=frame.picture.color)
+
+
+def _render_video(args: argparse.Namespace, camera: Camera, aim: Aim, viewport: Viewport) -> None:
+    from ..offline import decoded
+    from ..sources import file
+
+    source = file.FileSource(args.input, loop=False, pace=False, clock=lambda: 0)
+    frames = decoded(source.units())
+    first = next(frames, None)
+    if first is None:
+        raise SourceError(f"{args.input}: not a single picture in it can be decoded")
+    _write(
+        args,
+        itertools.chain([first], frames),
+        camera,
+        aim,
+        viewport,
+        total=source.expected_frames,
+        color=first.picture.color,
+        fps=source.frames_per_s,
+        audio_from=args.input,
+    )
+
+
+def _write(
+    args: argparse.Namespace,
+    frames: Iterable[Frame],
+    camera: Camera,
+    aim: Aim,
+    viewport: Viewport,
+    *,
+    total: int | None,
+    color: ColorSpace,
+    fps: float = 30.0,
+    audio_from: str | None = None,
+) -> None:
+    from ..offline import render_recording
+    from ..renderers.cpu import CpuRenderer
+    from ..sinks import open_sink
+    from ._bars import bar
+
+    mailbox: Mailbox[Frame] = Mailbox()
+    session = Session(mailbox, camera, aim, CpuRenderer(), viewport)
+    sink = open_sink(
+        args.output,
+        size=viewport.size,
+        fps=fps,
+        color=color,
+        overwrite=args.overwrite,
+        audio_from=audio_from,
+    )
+    try:
+        with bar(args.output, total, "frames", quiet=total == 1) as advance:
+            render_recording(frames, mailbox, session, sink, advance)
+    except KeyboardInterrupt:
+        print(f"interrupted; what was written to {args.output} plays", file=sys.stderr)
+        raise
+    finally:
+        sink.close()
