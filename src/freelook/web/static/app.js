@@ -8,7 +8,7 @@ import { HandHead } from './hand.js';
 import * as instruments from './instruments.js';
 import { Keyboard } from './keyboard.js';
 import { Latency } from './latency.js';
-import { panes, scaled } from './layout.js';
+import { panes, scaled, tapePlace } from './layout.js';
 import { Link } from './link.js';
 import { drawCaption, drawHorizon, drawOutline, drawTape } from './overlay.js';
 import { fillPanel } from './panel.js';
@@ -30,7 +30,7 @@ import { Camera } from './camera.js';
 
 const LINK_LOST_MS = 3000; // silent for so long: start over
 const TICK_MS = 250;
-const SOFTWARE_PIXELS = 1280 * 720;
+const SOFTWARE_PIXELS = 960 * 540;
 const GPU_PIXELS = 3840 * 2160;
 
 const byId = (/** @type {string} */ id) => /** @type {any} */ (document.getElementById(id));
@@ -46,6 +46,11 @@ export class App {
     this.stage = /** @type {HTMLElement} */ (byId('stage'));
     this.overlay = /** @type {HTMLCanvasElement} */ (byId('overlay'));
     this.renderer = new Renderer(byId('view'), shaderBody, new Camera(station.camera));
+    document.documentElement.classList.toggle('software', this.renderer.software);
+    byId('pip').style.aspectRatio = station.camera.size.join(' / ');
+    // Where software draws, lines are cheaper off the "GPU".
+    const options = { willReadFrequently: this.renderer.software };
+    this.context = /** @type {CanvasRenderingContext2D} */ (this.overlay.getContext('2d', options));
     this.link = new Link(this.wake, (rtp) => this.latency.frameTold(rtp));
     this.latency = new Latency(this.link);
     this.makeHeads();
@@ -170,7 +175,7 @@ export class App {
     const { renderer, ratio } = this;
     const { main, forward, fisheye } = this.panes();
     const view = this.viewOn(main);
-    const context = /** @type {CanvasRenderingContext2D} */ (this.overlay.getContext('2d'));
+    const { context } = this;
     context.setTransform(this.overlayRatio, 0, 0, this.overlayRatio, 0, 0);
     context.clearRect(0, 0, this.stage.clientWidth, this.stage.clientHeight);
     renderer.clear();
@@ -181,7 +186,7 @@ export class App {
       drawCaption(context, forward, 'STRAIGHT AHEAD');
     }
     if (fisheye) this.drawFisheye(context, fisheye, view, q);
-    if (this.settings.get('instruments')) drawTape(context, main, q, this.tapeTop(main));
+    if (this.settings.get('instruments')) drawTape(context, tapePlace(main, ['top', 'readings'].map((id) => rectOf(byId(id)))), q);
     instruments.showField(view.hfovDeg);
   }
 
@@ -201,13 +206,6 @@ export class App {
     return panes(clientWidth, clientHeight, split, pip ? rectOf(byId('pip')) : null);
   }
 
-  /** Below whatever else stands at the top of the pane. @param {import('./renderer.js').Rect} main */
-  tapeTop(main) {
-    const bar = rectOf(byId('top'));
-    const centre = main.x + main.width / 2;
-    const free = main.y > 0 || (bar.x + bar.width < centre - 225);
-    return free ? 10 : bar.y + bar.height + 8;
-  }
 
   /** @param {{width: number, height: number}} pane @returns {Viewport} */
   viewOn({ width, height }) {
@@ -243,7 +241,7 @@ export class App {
     }));
     instruments.showHead(head, aim.state, this.command.before);
     const { head: headDial, video, videoSince } = this.latency.summary(nowMs);
-    instruments.showDial('head', headDial, 'pose to view');
+    instruments.showDial('head', headDial, 'since pose');
     instruments.showDial('video', video, videoSince);
     this.showSource(nowMs);
     this.received = await this.framesReceived();

@@ -55,7 +55,9 @@ function headConditions({ head, aim, status }) {
 /** @param {Situation} now @returns {Condition[]} */
 function notices({ status, fits }) {
   const list = [];
-  if (!fits) list.push(warn('The video has another shape than the lens profile: the view is not true'));
+  const trouble = status?.source.state === 'live' && status.source.message;
+  if (trouble) list.push(warn(trouble));
+  else if (!fits) list.push(warn('The video has another shape than the lens profile: the view is not true'));
   if (status?.source.transcoding) list.push(info(`Transcoding: ${status.source.transcoding}`));
   return list;
 }

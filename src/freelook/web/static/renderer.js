@@ -15,7 +15,7 @@ export class Renderer {
    * @param {import('./camera.js').Camera} profile */
   constructor(canvas, shaderBody, profile) {
     const gl = canvas.getContext('webgl2', {
-      alpha: false, antialias: false, depth: false, desynchronized: true,
+      alpha: false, antialias: false, depth: false,
       powerPreference: 'high-performance',
     });
     if (!gl) throw new Error('This browser has no WebGL2, which draws the view.');
