@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
+
 from freelook.media.annexb import is_key, join_nals, split_nals
 from freelook.media.decode_thread import DecodeThread
 from freelook.media.rtp_video import RtpVideo

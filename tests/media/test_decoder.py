@@ -5,26 +5,31 @@ import io
 import av
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
 from freelook.errors import SourceError
 from freelook.media.annexb import is_key, split_nals
 from freelook.media.decoder import Decoder
 from freelook.types import AccessUnit, StreamInfo
-from hypothesis import given
-from hypothesis import strategies as st
 from video_streams import GOP, elementary_stream, pictures, write
 
 CODECS = ["h264", "hevc"]
 PICTURES = 2 * GOP
 
 
+def packets(codec: str, data: bytes) -> list[bytes]:
+    """The pictures that FFmpeg's parser finds in a byte stream."""
+    with av.open(io.BytesIO(data), "r", format=codec) as container:
+        return [bytes(p) for p in container.demux(video=0) if p.size]
+
+
 def units(codec: str) -> list[AccessUnit]:
-    """The packets FFmpeg's parser finds, stamped 1000, 2000, ..."""
-    with av.open(io.BytesIO(elementary_stream(codec)), format=codec) as container:
-        packets = [bytes(p) for p in container.demux(video=0) if p.size]
+    """Real pictures, stamped 1000, 2000, ..."""
     stream = StreamInfo(codec)
     return [
         AccessUnit(stream, p, is_key(codec, list(split_nals(p))), 1000 * (i + 1), i)
-        for i, p in enumerate(packets)
+        for i, p in enumerate(packets(codec, elementary_stream(codec)))
     ]
 
 
@@ -114,12 +119,11 @@ def test_a_change_of_codec_or_size_is_followed() -> None:
     decoder = Decoder()
     target = io.BytesIO()
     write(target, "h264", codec="h264", size=(160, 120), count=3)
-    with av.open(io.BytesIO(target.getvalue()), format="h264") as container:
-        small = [bytes(p) for p in container.demux(video=0) if p.size]
+    small = packets("h264", target.getvalue())
     sizes = []
-    for codec, packets in (("h264", units("h264")[:3]), ("hevc", units("hevc")[:3])):
-        sizes += [f.picture.size for u in packets for f in decoder.decode(u)]
-        assert codec == packets[0].stream.codec
+    for codec, some in (("h264", units("h264")[:3]), ("hevc", units("hevc")[:3])):
+        sizes += [f.picture.size for u in some for f in decoder.decode(u)]
+        assert codec == some[0].stream.codec
     for data in small:
         unit = AccessUnit(StreamInfo("h264"), data, True, 0)
         sizes += [f.picture.size for f in decoder.decode(unit)]

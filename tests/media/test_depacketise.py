@@ -1,12 +1,13 @@
 from __future__ import annotations
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
 from freelook.media.annexb import ParameterSets, nal_type, split_nals
 from freelook.media.depacketise import CodedPicture, Depacketiser, guess_codec
 from freelook.media.rtp import RtpPacket, parse_packet
 from freelook.types import Counters
-from hypothesis import given
-from hypothesis import strategies as st
 from video_streams import GOP, rtp_datagrams
 
 CODECS = ["h264", "hevc"]

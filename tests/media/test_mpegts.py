@@ -1,11 +1,12 @@
 from __future__ import annotations
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
 from freelook.media.decoder import Decoder
 from freelook.media.mpegts import PACKET_BYTES, TransportStream, crc32
 from freelook.types import AccessUnit, Counters
-from hypothesis import given
-from hypothesis import strategies as st
 from video_streams import GOP, transport_stream
 
 CODECS = ["h264", "hevc"]

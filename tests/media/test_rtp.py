@@ -1,10 +1,11 @@
 from __future__ import annotations
 
 import pytest
-from freelook.media.rtp import ReorderBuffer, RtpPacket, parse_packet
-from freelook.types import Counters
 from hypothesis import given
 from hypothesis import strategies as st
+
+from freelook.media.rtp import ReorderBuffer, RtpPacket, parse_packet
+from freelook.types import Counters
 
 MS = 1_000_000
 

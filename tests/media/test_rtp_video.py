@@ -3,12 +3,13 @@ from __future__ import annotations
 import random
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
 from freelook.media.decoder import Decoder
 from freelook.media.rtp_video import RtpVideo
 from freelook.types import AccessUnit, Counters
-from hypothesis import given
-from hypothesis import strategies as st
-from video_streams import GOP, rtp_datagrams, sequence_of, with_sequence, with_ssrc
+from video_streams import GOP, rtp_datagrams, with_sequence, with_ssrc
 
 MS = 1_000_000
 CODECS = ["h264", "hevc"]

@@ -5,10 +5,11 @@ import io
 
 import av
 import pytest
-from freelook.errors import SourceError
-from freelook.media.sdp import VideoDescription, parse_sdp
 from hypothesis import given
 from hypothesis import strategies as st
+
+from freelook.errors import SourceError
+from freelook.media.sdp import VideoDescription, parse_sdp
 
 SPS, PPS = b"\x67\x42\0\x1e", b"\x68\xce"
 H264 = """v=0

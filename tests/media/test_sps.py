@@ -5,12 +5,13 @@ from typing import Any
 
 import av
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
 from freelook.media.annexb import ParameterSets, is_key, split_nals
 from freelook.media.passthrough import why_transcode
 from freelook.media.sps import SpsInfo, parse_sps, stream_info
 from freelook.types import AccessUnit, StreamInfo
-from hypothesis import given
-from hypothesis import strategies as st
 from video_streams import elementary_stream, pictures
 
 
@@ -59,8 +60,9 @@ def test_size_and_format_as_the_encoder_was_told(
 def test_full_range_and_reordering_are_read_from_the_usability_information() -> None:
     packets = encode("h264", "yuvj420p", (320, 240), bf="2", **{"x264-params": "fullrange=on"})
     info = parse_sps("h264", sps_of("h264", packets[0]))
-    assert info == SpsInfo(320, 240, full_range=True, reorder_frames=info and info.reorder_frames)
+    assert info is not None
     assert info.reorder_frames
+    assert info == SpsInfo(320, 240, full_range=True, reorder_frames=info.reorder_frames)
     assert info.pixel_format == "yuvj420p"
 
 

@@ -20,7 +20,6 @@ KIND = "v4l2"
 
 # our names -> FFmpeg's (https://ffmpeg.org/ffmpeg-devices.html#video4linux2_002c-v4l2)
 _OPTIONS = {"size": "video_size", "rate": "framerate", "format": "input_format"}
-_FORMAT = "v4l2"
 _BACKLOG = 4
 _OLDEST_NS = 2 * NS_PER_S
 
@@ -137,7 +136,7 @@ class DeviceSource:
 def _open_device(path: str, chosen: Mapping[str, str]) -> InputContainer:
     options = {_OPTIONS[name]: value for name, value in chosen.items() if name in _OPTIONS}
     try:
-        return av.open(path, format=_FORMAT, options=options)
+        return av.open(path, format=KIND, options=options)
     except FileNotFoundError:
         there = ", ".join(devices()) or "none"
         raise SourceError(
