@@ -1,0 +1,116 @@
+"""Where views go: one file per kind of output, found by itself.
+
+A sink module has a one-line docstring (its row in the documentation), `KIND`, and two functions:
+`recognises(argument)` says whether this is one of its own, and `open(argument, settings)` makes
+the sink. Opening checks what can be checked at once, such as a file that is there already.
+"""
+
+from __future__ import annotations
+
+import pkgutil
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+
+from ..errors import SinkError
+from ..types import ColorSpace, Sink
+
+
+@dataclass(frozen=True)
+class SinkSettings:
+    """What to write. A sink raises SinkError for a setting that it cannot follow.
+
+    size         (width, height) of every frame
+    fps          nominal frames per second; recorded times come from the frames themselves
+    color        colour space of the frames and of what is written
+    codec        h264 or h265
+    overwrite    replace a file that is there already
+    audio_from   a recording whose sound is copied, at its own times
+    sdp          a file to write the description of a live stream to
+    bitrate      bits per second of a live stream; None: by the size
+    """
+
+    size: tuple[int, int]
+    fps: float = 30.0
+    color: ColorSpace = ColorSpace()  # noqa: RUF009 - frozen
+    codec: str = "h264"
+    overwrite: bool = False
+    audio_from: str | None = None
+    sdp: str | None = None
+    bitrate: int | None = None
+
+
+def modules() -> dict[str, ModuleType]:
+    """The sink modules by their KIND."""
+    found = [
+        import_module(f".{info.name}", __name__)
+        for info in pkgutil.iter_modules(__path__)
+        if not info.name.startswith("_")
+    ]
+    return {module.KIND: module for module in found}
+
+
+def open_sink(
+    argument: str,
+    *,
+    size: tuple[int, int],
+    fps: float = 30.0,
+    color: ColorSpace = ColorSpace(),  # noqa: B008 - frozen
+    codec: str = "h264",
+    overwrite: bool = False,
+    audio_from: str | None = None,
+    sdp: str | None = None,
+    bitrate: int | None = None,
+) -> Sink:
+    """The sink that an argument names: a file, an address, or `KIND:ARGUMENT`.
+
+    The settings are those of `SinkSettings`. SinkError when the argument means nothing here or
+    the output cannot be opened.
+    """
+    settings = SinkSettings(size, fps, color, codec, overwrite, audio_from, sdp, bitrate)
+    module, argument = find(argument)
+    sink: Sink = module.open(argument, settings)
+    return sink
+
+
+def find(argument: str) -> tuple[ModuleType, str]:
+    """The module for an argument, and the argument without its kind. SinkError if there is none."""
+    kinds = modules()
+    prefix, colon, rest = argument.partition(":")
+    if colon and prefix in kinds and not rest.startswith("//"):
+        return kinds[prefix], rest
+    return _recognise(argument, kinds), argument
+
+
+def _recognise(argument: str, kinds: Mapping[str, ModuleType]) -> ModuleType:
+    for module in kinds.values():
+        if module.recognises(argument):
+            return module
+    rows = "\n".join(
+        f"  {kind + ':':<9} {(module.__doc__ or '').splitlines()[0]}"
+        for kind, module in kinds.items()
+    )
+    raise SinkError(f"do not know how to write '{argument}'; outputs are:\n{rows}")
+
+
+def check_output_file(argument: str, *, overwrite: bool) -> Path:
+    """The path, if a file may be written there; else SinkError says what to do."""
+    path = Path(argument)
+    if path.is_dir():
+        raise SinkError(f"{argument} is a folder; name a file in it")
+    if not path.parent.is_dir():
+        raise SinkError(f"the folder {path.parent} does not exist; make it first")
+    if path.exists() and not overwrite:
+        raise SinkError(f"{argument} exists already; name another file or give --overwrite")
+    return path
+
+
+def refuse(settings: SinkSettings, what: str, *names: str) -> None:
+    """SinkError for settings that this kind of output cannot follow."""
+    for name in names:
+        if getattr(settings, name):
+            raise SinkError(
+                f"{what} cannot have {name.replace('_', ' ')} = {getattr(settings, name)}"
+            )
