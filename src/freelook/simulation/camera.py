@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from ..camera import Camera
 from ..color import rgb24_from_rgb, yuv_from_rgb_matrix
+from ..lens import radius_slope
 from ..types import ColorSpace, Frame, Picture, Plane
 from ..viewport import Viewport
 from .flight import FigureEight, Floats, State
@@ -91,6 +92,11 @@ class SimulatedCamera:
             np.full(half, 128, np.uint8),
             np.full(half, 128, np.uint8),
         )
+
+
+def pixel_deg(camera: Camera) -> float:
+    """How wide one pixel is in the middle of the picture, in degrees."""
+    return float(np.degrees(1 / radius_slope(camera.lens, np.zeros(1))[0]))
 
 
 def _pixel_tiles(camera: Camera) -> tuple[NDArray[np.int64], RayTiles]:
