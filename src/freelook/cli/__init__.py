@@ -14,7 +14,7 @@ from importlib import import_module
 from .. import __version__
 from ..errors import FreelookError, MissingExtra
 
-COMMANDS = ("demo", "fly", "render", "bench", "doctor")
+COMMANDS = ("demo", "fly", "render", "simulate", "bench", "doctor")
 
 EXTRA_OF = {
     "aiohttp": "web",
