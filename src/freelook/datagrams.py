@@ -110,3 +110,10 @@ def listen(argument: str, host: str, port: int) -> DatagramListener:
         elif error.errno == errno.EADDRNOTAVAIL:
             reason = f"{host} is not an address of this machine; use 0.0.0.0 for all of them"
         raise SourceError(f"{argument}: {reason}") from None
+
+
+def free_port() -> int:
+    """A UDP port of this machine that nobody listens on at this moment."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])

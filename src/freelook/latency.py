@@ -29,7 +29,7 @@ def draw_stamp(luma: Plane, time_ns: int) -> None:
     ValueError when the plane is too small to hold it.
     """
     time_us = time_ns // NS_PER_US % (1 << TIME_BITS)
-    word = time_us | _check(time_us) << TIME_BITS
+    word = time_us | check_bits(time_us) << TIME_BITS
     for bit, block in enumerate(_blocks(luma)):
         block[:] = BRIGHT if word >> bit & 1 else DARK
 
@@ -43,10 +43,10 @@ def read_stamp(luma: Plane) -> int | None:
             return None  # neither dark nor bright: not a stamp, or half of two
         word |= (level > (DARK + BRIGHT) / 2) << bit
     time_us = word & ((1 << TIME_BITS) - 1)
-    return time_us * NS_PER_US if word >> TIME_BITS == _check(time_us) else None
+    return time_us * NS_PER_US if word >> TIME_BITS == check_bits(time_us) else None
 
 
-def _check(time_us: int) -> int:
+def check_bits(time_us: int) -> int:
     """CRC-8 (polynomial 0x07, start 0x5A, so that an all-dark picture is not a time)."""
     crc = 0x5A
     for byte in time_us.to_bytes(TIME_BITS // 8, "little"):

@@ -13,9 +13,11 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import sys
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from ..bench.figures import Figure
     from ..bench.render import Timing
 
 
@@ -86,4 +88,46 @@ def _figures(timing: Timing, ours: Timing) -> dict[str, Any]:
 
 
 def _latency(args: argparse.Namespace) -> int:
-    raise NotImplementedError
+    from ..bench import page_latency, video_latency
+    from ..bench.figures import Figure
+
+    browser = page_latency.browser_path()
+    print("stamped 1280x720 H.264 at 30 frames/s over loopback ...", file=sys.stderr)
+    figures = [video_latency.ours(args.seconds), video_latency.libavformat(args.seconds)]
+    drawn_by = "skipped: no Chromium or Chrome here"
+    if browser is None:
+        figures.append(Figure(page_latency.POSE_TO_DRAWN, skipped=drawn_by))
+    else:
+        print("station, OpenTrack head at 250 Hz, page in headless Chromium ...", file=sys.stderr)
+        in_page, drawn_by = page_latency.measure(args.seconds, browser)
+        figures += in_page
+    if args.json:
+        rows = {f.name: {"skipped": f.skipped} if f.skipped else _percentiles(f) for f in figures}
+        print(json.dumps({"drawn_by": drawn_by, "figures_ms": rows}, indent=2))
+    else:
+        _print_latencies(figures, drawn_by)
+    return 0
+
+
+def _percentiles(figure: Figure) -> dict[str, float]:
+    shares = {f"p{percent}": figure.percentile_ms(percent) for percent in (50, 95, 99)}
+    return {**shares, "count": len(figure.values_ms)}
+
+
+def _print_latencies(figures: list[Figure], drawn_by: str) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title="latency on this machine, all parts on the same cores")
+    table.add_column("path")
+    for column in ("median ms", "p95 ms", "p99 ms", "count"):
+        table.add_column(column, justify="right")
+    for figure in figures:
+        if figure.skipped:
+            table.add_row(figure.name, figure.skipped, "", "", "")
+        else:
+            cells = _percentiles(figure)
+            count = f"{cells.pop('count'):.0f}"
+            table.add_row(figure.name, *(f"{value:.1f}" for value in cells.values()), count)
+    Console().print(table)
+    print(f"drawn by: {drawn_by}")

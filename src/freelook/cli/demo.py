@@ -10,12 +10,12 @@ from __future__ import annotations
 import argparse
 import asyncio
 import contextlib
-import socket
 import sys
 import time
 from collections import deque
 from functools import partial
 
+from ..datagrams import free_port
 from ..errors import FreelookError
 from ..formats import load_camera
 from .fly import add_flying_arguments, fly
@@ -101,10 +101,3 @@ async def end(child: asyncio.subprocess.Process) -> None:
         with contextlib.suppress(ProcessLookupError):
             child.kill()
         await child.wait()
-
-
-def free_port() -> int:
-    """A UDP port that nobody listens on at this moment."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
