@@ -138,7 +138,7 @@ class PageView:
         message = {
             "width": width,
             "height": height,
-            "planes": [base64.b64encode(np.ascontiguousarray(p)).decode() for p in picture.planes],
+            "planes": [base64.b64encode(p.tobytes()).decode() for p in picture.planes],
             "matrix": picture.color.matrix,
             "fullRange": picture.color.full_range,
         }

@@ -73,7 +73,7 @@ def test_the_wheel_zooms_within_10_and_150_degrees(view: PageView) -> None:
         view.page.wait_for_function(f"freelook.stats().fieldDeg === {limit}")
 
 
-TOUCH = """([id, type, x, y]) => document.getElementById('stage').dispatchEvent(new PointerEvent(type,
+TOUCH = """([id, type, x, y]) => freelook.app.stage.dispatchEvent(new PointerEvent(type,
     {pointerId: id, pointerType: 'touch', clientX: x, clientY: y, bubbles: true}))"""
 
 
@@ -215,7 +215,9 @@ def test_a_gamepad_wakes_the_page(pad_view: PageView) -> None:
 
 
 HELD_UP = {"alpha": 0, "beta": 90, "gamma": 0}
-ORIENT = """angles => window.dispatchEvent(new DeviceOrientationEvent('deviceorientation', angles))"""
+ORIENT = (
+    """angles => window.dispatchEvent(new DeviceOrientationEvent('deviceorientation', angles))"""
+)
 
 
 @pytest.fixture

@@ -18,7 +18,7 @@ from freelook.lens import (
     Stereographic,
 )
 from freelook.rotations import RDF_FROM_FRD, body_from_view
-from freelook.types import ColorSpace, Matrix, Picture
+from freelook.types import ColorSpace, Matrix, Picture, Plane
 from freelook.viewport import Viewport
 
 pytestmark = pytest.mark.browser
@@ -218,7 +218,7 @@ def painted(open_page) -> PageView:  # type: ignore[no-untyped-def]
     return page
 
 
-def redder(pixels: np.ndarray) -> bool:  # type: ignore[type-arg]
+def redder(pixels: Plane) -> bool:
     return bool(pixels[..., 0].mean() > pixels[..., 2].mean() + 30)
 
 

@@ -55,7 +55,7 @@ export class Latency {
       head: this.head.summary(nowMs),
       video: whole ? video : this.received.summary(nowMs),
       /** what the video age is counted from */
-      videoSince: whole ? 'since arrival' : 'since reception here',
+      videoSince: whole ? 'since arrival' : 'since reception',
     };
   }
 }

@@ -61,14 +61,20 @@ export class Link {
 
   /** @param {string} text @param {number} nowMs */
   receive(text, nowMs) {
-    const known = { pong: this.pong, pose: this.pose, frame: this.frame, status: this.setStatus };
     const message = parsed(text);
-    const handle = known[/** @type {keyof typeof known} */ (message?.type)];
-    if (!handle || !handle.call(this, message, nowMs)) {
-      this.bad += 1;
-      return;
+    if (this.understood(message, nowMs)) this.lastMs = nowMs;
+    else this.bad += 1;
+  }
+
+  /** @param {any} message @param {number} nowMs @returns {boolean} */
+  understood(message, nowMs) {
+    switch (message?.type) {
+      case 'pong': return this.pong(message, nowMs);
+      case 'pose': return this.pose(message, nowMs);
+      case 'frame': return this.frame(message);
+      case 'status': return this.setStatus(message);
+      default: return false;
     }
-    this.lastMs = nowMs;
   }
 
   /** @param {any} message @param {number} nowMs */
