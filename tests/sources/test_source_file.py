@@ -5,6 +5,7 @@ from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
 
+import av
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -174,6 +175,26 @@ def streamable(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     """A recording whose index comes first."""
     folder = tmp_path_factory.mktemp("whole")
     return video_file(folder, container_options={"movflags": "faststart"}).read_bytes()
+
+
+def test_one_damaged_picture_is_left_out(tmp_path: Path, streamable: bytes) -> None:
+    path = tmp_path / "flight.mp4"
+    path.write_bytes(streamable)
+    with av.open(str(path)) as container:
+        positions = [packet.pos for packet in container.demux(video=0) if packet.size]
+    broken = bytearray(streamable)
+    broken[positions[5] or 0] = 0x7F  # the length of its first NAL unit
+    path.write_bytes(broken)
+    source = open_source(str(path), pace=False)
+    assert len(list(source.units())) == PICTURES - 1
+    assert source.counters["damaged"] == 1
+
+
+def test_a_recording_of_nothing_does_not_loop_for_ever(tmp_path: Path, streamable: bytes) -> None:
+    path = tmp_path / "flight.mp4"
+    path.write_bytes(streamable[: streamable.index(b"mdat") + 20])
+    with pytest.raises(SourceError, match="not one picture"):
+        list(open_source(str(path), loop=True, pace=False).units())
 
 
 @given(data=st.data())

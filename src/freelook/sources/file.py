@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping
 from pathlib import Path
 
 import av
@@ -47,7 +47,7 @@ class FileSource:
     `media_ns` is the picture's own time in the file. `capture_ns` follows the decoding times,
     never runs backward, goes on through loops, and is when the unit is due; a reader that comes
     late by more than 0.2 s gets the rest at the usual pace, not in a burst. Counters: loops,
-    late, odd_times (steps that were backward, missing or absurd).
+    late, damaged (pictures left out), odd_times (steps that were backward, missing or absurd).
     """
 
     def __init__(self, path: str, *, loop: bool, pace: bool, clock: Clock) -> None:
@@ -84,7 +84,9 @@ class FileSource:
         self._start_ns = self._due_ns = self._clock()
         try:
             while not self._closing.is_set():
-                yield from self._play_once()
+                played = yield from self._play_once()
+                if not played and not self._closing.is_set():
+                    raise SourceError(f"{self._path}: not one picture of it can be read")
                 if not self._loop:
                     return
                 self._due_ns += self._frame_ns
@@ -97,31 +99,44 @@ class FileSource:
     def close(self) -> None:
         self._closing.set()
 
-    def _play_once(self) -> Iterator[AccessUnit]:
+    def _play_once(self) -> Generator[AccessUnit, None, int]:
+        """Yields the units of the file; returns how many there were."""
         self._dts: int | None = None
+        played = 0
         for packet in self._packets():
             self._due_ns += self._step_ns(packet.dts)
             if self._pace:
                 self._wait()
             if self._closing.is_set():
-                return
+                break
             yield self._unit(packet)
+            played += 1
+        return played
 
     def _packets(self) -> Iterator[av.Packet[VideoStream]]:
         bsf_name = _ANNEX_B.get(self._info.codec)
         self._sets = ParameterSets(self._info.codec) if bsf_name else None
-        bsf = BitStreamFilterContext(bsf_name, self._stream) if bsf_name else None
         try:
+            bsf = BitStreamFilterContext(bsf_name, self._stream) if bsf_name else None
             for packet in self._container.demux(self._stream):
                 if not packet.size:
                     continue
-                yield from bsf.filter(packet) if bsf else [packet]
+                yield from self._filtered(bsf, packet) if bsf else [packet]
         except FFmpegError as error:
             after_s = (self._due_ns - self._start_ns) / NS_PER_S
             raise SourceError(
                 f"{self._path}: the file is damaged {after_s:.1f} s after the start: "
                 f"{error.strerror}"
             ) from None
+
+    def _filtered(
+        self, bsf: BitStreamFilterContext, packet: av.Packet[VideoStream]
+    ) -> list[av.Packet[VideoStream]]:
+        try:
+            return bsf.filter(packet)
+        except FFmpegError:  # one damaged picture does not end the recording
+            self.counters.add("damaged")
+            return []
 
     def _unit(self, packet: av.Packet[VideoStream]) -> AccessUnit:
         data, key = bytes(packet), packet.is_keyframe
@@ -173,7 +188,7 @@ def _open_video(path: str) -> tuple[InputContainer, VideoStream]:
             raise SourceError(f"{path}: this is a folder, not a video file")
         if file.stat().st_size == 0:
             raise SourceError(f"{path}: the file is empty")
-        container = av.open(path, options={"protocol_whitelist": "file"})
+        container = av.open(path, options={"protocol_whitelist": "file"}, metadata_errors="replace")
     except FFmpegError as error:
         raise SourceError(
             f"{path}: not a video file, or cut off before its index ({error.strerror})"
@@ -182,13 +197,14 @@ def _open_video(path: str) -> tuple[InputContainer, VideoStream]:
         raise SourceError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
     for stream in container.streams.video:
         cover = stream.disposition & Disposition.attached_pic
-        if not cover and container.format.name != "tty":  # "tty" takes any text for a picture
+        unknown = stream.codec_context is None  # no decoder for it
+        # "tty" takes any text for a picture
+        if not cover and not unknown and container.format.name != "tty":
             return container, stream
-    kinds = sorted(str(stream.type) for stream in container.streams) or ["nothing"]
+    kinds = dict.fromkeys(sorted(str(stream.type) for stream in container.streams))
     container.close()
-    raise SourceError(
-        f"{path}: there is no video in this file, only {' and '.join(dict.fromkeys(kinds))}"
-    )
+    found = " and ".join(kinds).replace("video", "video of an unknown kind") or "nothing"
+    raise SourceError(f"{path}: there is no video in this file to decode, only {found}")
 
 
 def _stream_info(stream: VideoStream) -> StreamInfo:
