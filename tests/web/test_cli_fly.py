@@ -3,46 +3,15 @@
 from __future__ import annotations
 
 import json
-import signal
 import socket
-import subprocess
-import sys
 import urllib.request
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from commands import running, stop
 
 from freelook.cli import main
-from freelook.cli.demo import free_port
-
-
-@contextmanager
-def running(*arguments: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    """A command in its own process, and the address it printed."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "freelook", *arguments, "--port", "0", "--no-browser"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        assert process.stdout is not None
-        line = process.stdout.readline()
-        if not line.startswith("view: http"):
-            process.kill()
-            pytest.fail(f"{line}{process.communicate()}")
-        yield process, line.removeprefix("view: ").strip()
-    finally:
-        process.kill()
-        process.communicate()
-
-
-def stop(process: subprocess.Popen[str]) -> tuple[int, str, str]:
-    process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=15)
-    return process.returncode, out, err
+from freelook.datagrams import free_port
 
 
 def test_fly_serves_its_page_and_ends_with_ctrl_c() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import ssl
 import stat
 from pathlib import Path
@@ -11,6 +10,7 @@ import aiohttp
 import pytest
 from aiohttp import web
 from cryptography import x509
+from whep_peer import run
 
 from freelook.errors import FreelookError
 from freelook.web import security, serving
@@ -137,7 +137,7 @@ def test_places_where_nobody_can_listen(host: str, port: int, why: str, state: P
 
 
 def test_a_browser_that_knows_the_certificate_gets_in(state: Path) -> None:
-    async def run(door: Door) -> tuple[int, int]:
+    async def visit(door: Door) -> tuple[int, int]:
         async def inside(request: web.Request) -> web.Response:
             return web.Response(text="in")
 
@@ -157,7 +157,7 @@ def test_a_browser_that_knows_the_certificate_gets_in(state: Path) -> None:
         await runner.cleanup()
         return result
 
-    assert asyncio.run(run(open_door("127.0.0.1", 0, tls=True))) == (200, 200)
+    assert run(visit(open_door("127.0.0.1", 0, tls=True))) == (200, 200)
 
 
 def test_a_browser_is_opened_only_where_there_is_a_screen(monkeypatch: pytest.MonkeyPatch) -> None:

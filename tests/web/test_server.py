@@ -2,27 +2,15 @@
 
 from __future__ import annotations
 
-import asyncio
-from collections.abc import Awaitable, Callable
 from typing import Any
 
 import pytest
-from whep_peer import Bench, Camera, Peer, bench, until
+from whep_peer import Bench, Camera, Peer, flown, until
 
 from freelook.web.security import Guard
 
 SDP = {"Content-Type": "application/sdp"}
 JSON = {"Content-Type": "application/json"}
-
-
-def flown(test: Callable[[Bench], Awaitable[None]], *trackers: str, **options: Any) -> None:
-    """Run a test against a running station."""
-
-    async def run() -> None:
-        async with bench(*trackers, **options) as station:
-            await test(station)
-
-    asyncio.run(run())
 
 
 async def ask(station: Bench, method: str, path: str, **options: Any) -> tuple[int, str, Any]:

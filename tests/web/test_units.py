@@ -8,6 +8,7 @@ from itertools import pairwise
 
 from hypothesis import given
 from hypothesis import strategies as st
+from whep_peer import run
 
 from freelook.types import AccessUnit, Counters, StreamInfo
 from freelook.web.track import RtpClock, UnitTrack, last_rtp_timestamp
@@ -103,7 +104,7 @@ def test_replayed_pictures_are_stamped_just_before_the_newest() -> None:
 
 
 def test_every_thread_may_offer_and_listeners_hear_in_order() -> None:
-    async def run() -> None:
+    async def test() -> None:
         hub = Hub(asyncio.get_running_loop())
         heard: list[int] = []
         unsubscribe = hub.subscribe(lambda u: heard.append(u.capture_ns // (33 * MS)))
@@ -122,11 +123,11 @@ def test_every_thread_may_offer_and_listeners_hear_in_order() -> None:
         await asyncio.sleep(0)
         assert heard == list(range(20))
 
-    asyncio.run(run())
+    run(test())
 
 
 def test_a_loop_that_stands_still_costs_pictures_not_memory() -> None:
-    async def run() -> None:
+    async def test() -> None:
         hub = Hub(asyncio.get_running_loop())
         heard: list[AccessUnit] = []
         hub.subscribe(heard.append)
@@ -137,11 +138,11 @@ def test_a_loop_that_stands_still_costs_pictures_not_memory() -> None:
         assert heard[0].key
         assert hub.counters["dropped"] + len(heard) == 1020
 
-    asyncio.run(run())
+    run(test())
 
 
 def test_a_slow_viewer_resumes_at_a_key_picture() -> None:
-    async def run() -> None:
+    async def test() -> None:
         hub = Hub(asyncio.get_running_loop())
         counters = Counters()
         track = UnitTrack(hub, counters, lambda rtp, capture_ns: None)
@@ -163,7 +164,7 @@ def test_a_slow_viewer_resumes_at_a_key_picture() -> None:
         assert counters["overflows"] == 1
         track.stop()
 
-    asyncio.run(run())
+    run(test())
 
 
 def test_without_aiortcs_private_fields_there_is_no_time_stamp() -> None:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import asyncio
 import json
 import time
-from collections.abc import Awaitable, Callable
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
 from aiortc import rtcrtpreceiver
-from whep_peer import Bench, Camera, Peer, bench, until
+from whep_peer import Bench, Camera, Peer, flown, until
 
 from freelook.clock import now_ns
 from freelook.media.annexb import split_nals
@@ -22,14 +21,6 @@ from freelook.web import whep
 from freelook.web.whep import Viewer
 
 Units = list[tuple[int, bytes]]
-
-
-def flown(test: Callable[[Bench], Awaitable[None]], *trackers: str, **options: Any) -> None:
-    async def run() -> None:
-        async with bench(*trackers, **options) as station:
-            await test(station)
-
-    asyncio.run(run())
 
 
 def only_viewer(station: Bench) -> Viewer:

@@ -7,9 +7,10 @@ import json
 import queue
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Awaitable, Callable, Coroutine, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
-from typing import Any
+from typing import Any, TypeVar
 
 import aiohttp
 import numpy as np
@@ -30,6 +31,7 @@ from freelook.web.server import make_app
 from freelook.web.station import About, Station
 
 SIZE = (320, 320)
+T = TypeVar("T")
 
 
 async def until(condition: Callable[[], Any], what: str, seconds: float = 10.0) -> Any:
@@ -40,6 +42,22 @@ async def until(condition: Callable[[], Any], what: str, seconds: float = 10.0) 
             pytest.fail(f"after {seconds} s still no: {what}")
         await asyncio.sleep(0.005)
     return value
+
+
+def run(work: Coroutine[Any, Any, T]) -> T:
+    """`asyncio.run` on a thread of its own: Playwright keeps a loop running on the main one."""
+    with ThreadPoolExecutor(1) as pool:
+        return pool.submit(asyncio.run, work).result()
+
+
+def flown(test: Callable[[Bench], Awaitable[None]], *trackers: str, **options: Any) -> None:
+    """Run a test against a running station."""
+
+    async def fly() -> None:
+        async with bench(*trackers, **options) as station:
+            await test(station)
+
+    run(fly())
 
 
 class ScriptedSource:

@@ -197,10 +197,16 @@ def _free_name(kind: str, taken: dict[str, Head]) -> str:
 
 
 def announce(door: Door, open_browser: bool) -> None:
+    from ..web.security import local_addresses
     from ..web.serving import can_open_browser
 
     for url in door.urls:
         say(f"view: {url}")
+    if not local_addresses():
+        say(
+            "this machine has no network address, and browsers take WebRTC video only over one: "
+            "switch on any network, it need not lead anywhere"
+        )
     if door.tls is not None:
         say("the browser will warn of a certificate it does not know, unless you gave a known one")
     if open_browser and can_open_browser():

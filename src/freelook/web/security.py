@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.parse import urlsplit
 
+import ifaddr
 from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
@@ -65,24 +66,12 @@ def is_loopback(host: str) -> bool:
 
 
 def local_addresses() -> list[str]:
-    """Addresses other machines may reach this one by; the most likely first. Sends nothing."""
-    found = [address for address in (_routed_address(),) if address]
-    try:
-        infos = socket.getaddrinfo(socket.gethostname(), None, type=socket.SOCK_DGRAM)
-    except OSError:
-        infos = []
-    found += [str(info[4][0]) for info in infos if "%" not in str(info[4][0])]
-    return [a for a in dict.fromkeys(found) if not ipaddress.ip_address(a).is_loopback]
-
-
-def _routed_address() -> str | None:
-    """The address a packet to the outside would leave from; connecting UDP sends none."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        try:
-            probe.connect(("192.0.2.1", 9))
-        except OSError:
-            return None
-        return str(probe.getsockname()[0])
+    """This machine's addresses other machines may reach it by: IPv4 first, no link-local ones."""
+    found = [ip.ip for adapter in ifaddr.get_adapters() for ip in adapter.ips]
+    texts = [text if isinstance(text, str) else text[0] for text in found]
+    usable = [ipaddress.ip_address(text) for text in dict.fromkeys(texts)]
+    usable = [a for a in usable if not (a.is_loopback or a.is_link_local)]
+    return [str(a) for a in sorted(usable, key=lambda a: a.version)]
 
 
 def tls_context(certificate: Path, key: Path | None) -> ssl.SSLContext:
