@@ -55,7 +55,8 @@ def av_from_picture(picture: Picture) -> av.VideoFrame:
 
 
 def _plane(plane: av.video.plane.VideoPlane, channels: int) -> Plane:
-    rows = np.frombuffer(plane, np.uint8).reshape(plane.height, plane.line_size)
+    rows: Plane = np.frombuffer(plane, np.uint8)  # type: ignore[call-overload]
+    rows = rows.reshape(plane.height, plane.line_size)
     rows = rows[:, : plane.width * channels]
     return rows.reshape(plane.height, plane.width, channels) if channels > 1 else rows
 
