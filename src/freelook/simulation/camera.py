@@ -15,7 +15,8 @@ from ..lens import radius_slope
 from ..types import ColorSpace, Frame, Picture, Plane
 from ..viewport import Viewport
 from .flight import FigureEight, Floats, State
-from .tiles import SIDE, TILE, RayTiles, in_threads, make_tiles, make_view, shade_planes
+from .scratch import SIDE, TILE
+from .tiles import RayTiles, in_threads, make_tiles, make_view, shade_planes
 from .world import World, checked_position, landscape
 
 

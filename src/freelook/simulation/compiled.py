@@ -1,4 +1,8 @@
-"""How the simulation's inner functions are compiled."""
+"""How the simulation's inner functions are compiled.
+
+They must not meet infinities or NaN (the fast arithmetic assumes there are none); division
+follows IEEE, without tests for zero; other threads may run meanwhile.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +10,4 @@ from functools import partial
 
 from numba import njit
 
-# fast arithmetic that still respects infinities; IEEE division; other threads may run meanwhile
-jit = partial(
-    njit,
-    fastmath={"contract", "reassoc", "nsz", "arcp"},
-    error_model="numpy",
-    nogil=True,
-    cache=True,
-)
+jit = partial(njit, fastmath=True, error_model="numpy", nogil=True, cache=True)

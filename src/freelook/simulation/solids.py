@@ -7,9 +7,8 @@ import numpy as np
 from .compiled import jit
 from .ramps import dashes, glyph_cover, stretched, strip, stroke
 from .scene import BANDS, BOX, WINDOWS
-from .shading import DD, DE, DN, HAZE, blend, haze_at, mix
+from .scratch import COVER, DD, DE, DN, HAZE, TILE, F, blend, haze_at, mix
 
-F = np.float32
 NORTH_FACE, SOUTH_FACE, EAST_FACE, WEST_FACE = range(4)
 PAINT = (F(0.96), F(0.96), F(0.94))
 GLASS = (F(0.22), F(0.27), F(0.34))
@@ -24,14 +23,17 @@ def shade_solids(scene, view, listed, count, s):  # type: ignore[no-untyped-def]
         row = scene.rows[index]
         cn, ce, cd = row[0] - view.position[0], row[1] - view.position[1], row[2] - view.position[2]
         away2 = cn * cn + ce * ce + cd * cd
-        for k in range(s.shape[1]):
-            along = s[DN, k] * cone[0] + s[DE, k] * cone[1] + s[DD, k] * cone[2]
-            if along < cone[3]:
+        axis_n, axis_e, axis_d, least = cone[0], cone[1], cone[2], cone[3]
+        for k in range(TILE):
+            s[COVER + k] = s[DN + k] * axis_n + s[DE + k] * axis_e + s[DD + k] * axis_d
+        is_box = scene.kinds[index] == BOX
+        for k in range(TILE):
+            if s[COVER + k] < least:
                 continue
-            if scene.kinds[index] == BOX:
+            if is_box:
                 _box(row, scene.glyphs, view.position, view.softness, scene.sun, s, k)
-            elif along > 0:
-                along *= np.sqrt(away2)
+            elif s[COVER + k] > 0:
+                along = s[COVER + k] * np.sqrt(away2)
                 _ball(row, cn, ce, cd, along, away2, view.softness, scene.sun, s, k)
 
 
@@ -78,7 +80,7 @@ def _wall(row, glyphs, face, u, v, bu, bv, u0, du, dv, t, softness):  # type: ig
 @jit()
 def _box(row, glyphs, p, softness, sun, s, k):  # type: ignore[no-untyped-def]
     """Up to three faces; along a shared edge their covers add up to one."""
-    dn, de, dd = s[DN, k], s[DE, k], s[DD, k]
+    dn, de, dd = s[DN + k], s[DE + k], s[DD + k]
     n0, n1, e0, e1, d0, d1 = row[4], row[5], row[6], row[7], row[8], row[9]
     total, nearest, r, g, b = F(0), F(1e9), F(0), F(0), F(0)
     for axis in range(3):
@@ -123,7 +125,11 @@ def _ball(row, cn, ce, cd, t, away2, softness, sun, s, k):  # type: ignore[no-un
     if cover <= 0:
         return
     rise = np.sqrt(max(radius * radius - off2, F(0)) + radius * blur)
-    mn, me, md = (t - rise) * s[DN, k] - cn, (t - rise) * s[DE, k] - ce, (t - rise) * s[DD, k] - cd
+    mn, me, md = (
+        (t - rise) * s[DN + k] - cn,
+        (t - rise) * s[DE + k] - ce,
+        (t - rise) * s[DD + k] - cd,
+    )
     size = F(1) / np.sqrt(mn * mn + me * me + md * md)
     mn, me, md = mn * size, me * size, md * size
     lit = mn * sun[0] + me * sun[1] + md * sun[2]

@@ -64,7 +64,7 @@ def ground() -> Pyramid:
 def detail() -> Pyramid:
     """How much brighter than its colour the ground is close up: grass and soil, mean 0."""
     noise = fractal_noise(np.random.default_rng(7), DETAIL_TEXELS, octaves=(12, 24, 48, 96, 128))
-    return make_pyramid(0.2 * (noise - noise.mean())[..., None], DETAIL_TEXEL_M)
+    return make_pyramid(0.2 * (noise - noise.mean()), DETAIL_TEXEL_M)
 
 
 @cache
@@ -72,7 +72,7 @@ def clouds() -> Pyramid:
     """How thick a layer of fair-weather clouds is: 0 clear, 1 and more opaque."""
     noise = fractal_noise(np.random.default_rng(5), CLOUD_TEXELS, octaves=(6, 12, 24, 48, 96, 192))
     thick = 0.92 * _step(0.08, 0.75, noise) + np.maximum(noise - 0.6, 0)
-    return make_pyramid(thick[..., None], CLOUD_TEXEL_M)
+    return make_pyramid(thick, CLOUD_TEXEL_M)
 
 
 @cache

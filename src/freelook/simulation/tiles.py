@@ -15,15 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .compiled import jit
+from .ground import shade_ground
 from .pyramid import Float32s, Pyramid
 from .scene import Scene
-from .shading import BLUE, DD, DE, DN, GREEN, LOWEST, RED, ROWS, shade_ground, shade_sky
+from .scratch import BLUE, DD, DE, DN, GREEN, LOWEST, RED, SCRATCH, SIDE, TILE, F
+from .sky import shade_sky
 from .solids import shade_solids
 
-F = np.float32
 Floats = NDArray[np.floating[Any]]
-SIDE = 16
-TILE = SIDE * SIDE
 
 
 class Landscape(NamedTuple):
@@ -121,30 +120,34 @@ def shade_tile(landscape, tiles, view, tile, s, listed):  # type: ignore[no-unty
     lowest, highest = F(1), F(-1)
     for k in range(TILE):
         x, y, z = tiles.rays[tile, k, 0], tiles.rays[tile, k, 1], tiles.rays[tile, k, 2]
-        s[DN, k] = m[0, 0] * x + m[0, 1] * y + m[0, 2] * z
-        s[DE, k] = m[1, 0] * x + m[1, 1] * y + m[1, 2] * z
-        s[DD, k] = m[2, 0] * x + m[2, 1] * y + m[2, 2] * z
-        lowest, highest = min(lowest, s[DD, k]), max(highest, s[DD, k])
+        s[DN + k] = m[0, 0] * x + m[0, 1] * y + m[0, 2] * z
+        s[DE + k] = m[1, 0] * x + m[1, 1] * y + m[1, 2] * z
+        s[DD + k] = m[2, 0] * x + m[2, 1] * y + m[2, 2] * z
+        lowest, highest = min(lowest, s[DD + k]), max(highest, s[DD + k])
     if highest > LOWEST:
         shade_ground(landscape, view.position, view.softness, s)
     if lowest <= LOWEST:
-        shade_sky(landscape, view.position, view.softness, s)
+        shade_sky(landscape, view.position, view.softness, -highest, s)
     count = _find(view, tiles.cones[tile], listed)
     shade_solids(landscape.scene, view, listed, count, s)
     for k in range(TILE):
         seen = F(tiles.valid[tile, k])
-        for c in range(RED, BLUE + 1):
-            s[c, k] = seen * min(max(s[c, k], F(0)), F(1))
+        for c in (RED, GREEN, BLUE):
+            s[c + k] = seen * min(max(s[c + k], F(0)), F(1))
 
 
 @jit()
 def shade_tiles(landscape, tiles, view, first, last, out):  # type: ignore[no-untyped-def]
     """Colours of the tiles first to last (excluded) into out (tiles, 256, 3)."""
-    listed, s = np.empty(len(view.order), np.int32), np.empty((ROWS, TILE), np.float32)
+    listed, s = np.empty(len(view.order), np.int32), np.empty(SCRATCH, np.float32)
     for tile in range(first, last):
         shade_tile(landscape, tiles, view, tile, s, listed)
         for k in range(TILE):
-            out[tile, k, 0], out[tile, k, 1], out[tile, k, 2] = s[RED, k], s[GREEN, k], s[BLUE, k]
+            out[tile, k, 0], out[tile, k, 1], out[tile, k, 2] = (
+                s[RED + k],
+                s[GREEN + k],
+                s[BLUE + k],
+            )
 
 
 @jit()
@@ -153,14 +156,14 @@ def shade_planes(landscape, tiles, view, first, last, corners, yuv, y, u, v):  #
 
     `yuv` (3, 4): code values = yuv[:, :3] @ rgb + yuv[:, 3]. Chroma is the mean of 2x2 pixels.
     """
-    listed, s = np.empty(len(view.order), np.int32), np.empty((ROWS, TILE), np.float32)
+    listed, s = np.empty(len(view.order), np.int32), np.empty(SCRATCH, np.float32)
     for tile in range(first, last):
         shade_tile(landscape, tiles, view, tile, s, listed)
         left, top = corners[tile, 0], corners[tile, 1]
         for row in range(min(SIDE, y.shape[0] - top)):
             for column in range(min(SIDE, y.shape[1] - left)):
                 k = row * SIDE + column
-                luma = yuv[0, 0] * s[RED, k] + yuv[0, 1] * s[GREEN, k] + yuv[0, 2] * s[BLUE, k]
+                luma = yuv[0, 0] * s[RED + k] + yuv[0, 1] * s[GREEN + k] + yuv[0, 2] * s[BLUE + k]
                 y[top + row, left + column] = np.uint8(luma + yuv[0, 3] + F(0.5))
         left, top = left // 2, top // 2
         for row in range(min(SIDE // 2, u.shape[0] - top)):
@@ -177,7 +180,7 @@ def shade_planes(landscape, tiles, view, first, last, corners, yuv, y, u, v):  #
 
 @jit(inline="always")
 def _mean_of_four(s, c, k):  # type: ignore[no-untyped-def]
-    return F(0.25) * (s[c, k] + s[c, k + 1] + s[c, k + SIDE] + s[c, k + SIDE + 1])
+    return F(0.25) * (s[c + k] + s[c + k + 1] + s[c + k + SIDE] + s[c + k + SIDE + 1])
 
 
 def in_threads(work: Callable[[int, int], None], tiles: int, threads: int) -> None:

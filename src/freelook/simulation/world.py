@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from ..errors import RenderError
 from . import terrain
 from .scene import airfield
-from .tiles import TILE, Landscape, in_threads, make_tiles, make_view, shade_tiles
+from .scratch import TILE
+from .tiles import Landscape, in_threads, make_tiles, make_view, shade_tiles
 
 Floats = NDArray[np.float64]
 SHARP_DEG = 0.2  # about one pixel of the demo's camera
