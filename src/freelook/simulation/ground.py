@@ -43,9 +43,11 @@ def shade_ground(landscape, position, softness, s):  # type: ignore[no-untyped-d
     _textures(landscape.ground, landscape.detail, s)
     scene = landscape.scene
     for index in range(scene.flat):
-        row = scene.rows[index]
-        if row[0] > high_n or row[1] < low_n or row[2] > high_e or row[3] < low_e:
+        if scene.rows[index, 0] > high_n or scene.rows[index, 1] < low_n:
             continue
+        if scene.rows[index, 2] > high_e or scene.rows[index, 3] < low_e:
+            continue
+        row = scene.rows[index]
         kind = scene.kinds[index]
         if kind in (RECT, SHADOW):
             _rectangle(row[4], row[5], row[6], row[7], s)
