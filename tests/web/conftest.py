@@ -91,9 +91,10 @@ def open_page(browser: Any, page_station: PageStation) -> Iterator[OpenPage]:
         if script:
             page.add_init_script(script)
         page.goto(page_station.url + query)
+        view = PageView(page)
         if ready:
-            page.wait_for_function("window.freelook?.ready")
-        return PageView(page)
+            view.until("window.freelook?.ready")
+        return view
 
     yield open_it
     for context in contexts:

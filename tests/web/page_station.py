@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import base64
 import threading
+import time
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 from freelook.camera import Camera
 from freelook.rotations import FRD_FROM_RDF
 from freelook.types import Picture
+from freelook.web.server import HEADERS
 
 PACKAGE = Path(__file__).resolve().parents[2] / "src" / "freelook"
 
@@ -89,6 +91,7 @@ class PageStation:
         authorization = request.headers.get("Authorization", "")
         self.requests.append((request.method, request.path, authorization))
         response: web.StreamResponse = await handler(request)
+        response.headers.update(HEADERS)  # the real station's: scripts from itself only, ...
         return response
 
     async def _index(self, request: web.Request) -> web.StreamResponse:
@@ -131,6 +134,14 @@ class PageView:
 
     def js(self, expression: str, argument: Any = None) -> Any:
         return self.page.evaluate(expression, argument)
+
+    def until(self, expression: str, timeout_s: float = 15.0) -> None:
+        """Fails unless this becomes true. (Chromium's own waiting needs eval, which the page's
+        security policy forbids.)"""
+        deadline = time.monotonic() + timeout_s
+        while not self.js(expression):
+            assert time.monotonic() < deadline, f"never became true: {expression}"
+            self.page.wait_for_timeout(10)
 
     def put(self, picture: Picture) -> None:
         """Show this picture (i420 or nv12) instead of video."""

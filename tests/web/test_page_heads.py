@@ -52,7 +52,7 @@ def test_axes_can_be_inverted_and_scaled_and_it_is_remembered(view: PageView) ->
     panel.get_by_label("pitch scale").first.fill("2")
     view.page.get_by_role("button", name="Close").last.click()
     view.page.reload()
-    view.page.wait_for_function("window.freelook?.ready")
+    view.until("window.freelook?.ready")
     drag(view.page, 100, 40)
     assert view.head() == pytest.approx((100 * DEG_PER_PX, 80 * DEG_PER_PX, 0), abs=0.3)
 
@@ -65,12 +65,12 @@ def test_pitch_ends_straight_up_and_yaw_goes_round(view: PageView) -> None:
 def test_the_wheel_zooms_within_10_and_150_degrees(view: PageView) -> None:
     view.page.mouse.move(320, 240)
     view.page.mouse.wheel(0, -100)
-    view.page.wait_for_function("freelook.stats().fieldDeg < 89")
+    view.until("freelook.stats().fieldDeg < 89")
     assert view.stats()["fieldDeg"] == pytest.approx(90 / 1.1, abs=0.1)
     for turn, limit in ((-300, 10), (300, 150)):
         for _ in range(14):
             view.page.mouse.wheel(0, turn)
-        view.page.wait_for_function(f"freelook.stats().fieldDeg === {limit}")
+        view.until(f"freelook.stats().fieldDeg === {limit}")
 
 
 TOUCH = """([id, type, x, y]) => freelook.app.stage.dispatchEvent(new PointerEvent(type,
@@ -140,7 +140,7 @@ def test_plus_and_minus_zoom(view: PageView) -> None:
 
 def test_real_key_presses_reach_the_head_and_stop_with_the_key(view: PageView) -> None:
     view.page.keyboard.down("ArrowRight")
-    view.page.wait_for_function("freelook.stats().angles.yaw > 2")
+    view.until("freelook.stats().angles.yaw > 2")
     view.page.keyboard.up("ArrowRight")
     assert not view.js("freelook.app.keyboard.active")
     view.page.keyboard.press("r")
@@ -210,7 +210,7 @@ def test_a_gamepad_wakes_the_page(pad_view: PageView) -> None:
         "window.pad = {connected: true, axes: [0, 0, 1, 0], buttons: []};"
         "dispatchEvent(new Event('gamepadconnected'))"
     )
-    pad_view.page.wait_for_function("freelook.stats().angles.yaw > 3")
+    pad_view.until("freelook.stats().angles.yaw > 3")
     pad_view.js("window.pad = null")
 
 
@@ -226,7 +226,7 @@ def phone(open_page: Any) -> PageView:
         viewport={"width": 390, "height": 844}, is_mobile=True, has_touch=True
     )
     page.page.get_by_role("button", name="Phone").tap()
-    page.page.wait_for_function("freelook.headSource === 'phone'")
+    page.until("freelook.headSource === 'phone'")
     page.js(ORIENT, HELD_UP)
     return page
 

@@ -13,6 +13,7 @@ from page_station import PageStation, PageView
 
 from freelook.rotations import RDF_FROM_FRD, body_from_view, to_wxyz
 from freelook.types import Picture
+from freelook.viewport import Viewport
 
 pytestmark = pytest.mark.browser
 
@@ -68,7 +69,7 @@ def test_touching_the_mouse_takes_the_command_where_the_view_is(tracked: PageVie
 
 def test_a_button_gives_the_command_back(tracked: PageView) -> None:
     tracked.page.keyboard.press("ArrowLeft", delay=80)
-    tracked.page.wait_for_function("freelook.headSource === 'hand'")
+    tracked.until("freelook.headSource === 'hand'")
     tracked.page.get_by_role("button", name="Give back to opentrack").click()
     pose(tracked, 5, -5)
     assert tracked.js("freelook.headSource") == "opentrack"
@@ -175,7 +176,7 @@ def test_lost_video_is_greyed_with_its_age_and_comes_back(view: PageView) -> Non
     assert np.ptp(view.view()[8, 8].astype(int)) == 0
     view.shows("Video lost 2 s ago")
     view.put(red)
-    view.page.wait_for_function("freelook.stats().grey === 0")
+    view.until("freelook.stats().grey === 0")
     view.page.get_by_text("Video lost").wait_for(state="detached")
 
 
@@ -188,8 +189,8 @@ def test_status_is_shown(view: PageView) -> None:
     )
     view.shows("Transcoding: H.265 is not decoded here")
     view.shows("rtp://127.0.0.1:5004")
-    view.page.wait_for_function("document.getElementById('count-viewers').textContent === '3'")
-    view.page.wait_for_function("document.getElementById('source').dataset.state === 'live'")
+    view.until("document.getElementById('count-viewers').textContent === '3'")
+    view.until("document.getElementById('source').dataset.state === 'live'")
 
 
 def test_video_of_another_shape_is_said(view: PageView) -> None:
@@ -247,14 +248,14 @@ def test_frames_are_counted(view: PageView) -> None:
 
 def test_nothing_is_drawn_when_nothing_changed(view: PageView) -> None:
     view.put(gray_picture())
-    view.page.wait_for_function("freelook.stats().grey === 1")
-    view.page.wait_for_function("!freelook.app.scheduled")
+    view.until("freelook.stats().grey === 1")
+    view.until("!freelook.app.scheduled")
     draws = view.stats()["draws"]
     wait = "new Promise(done => setTimeout(done, 600))"  # two ticks of the page
     view.js(wait)
     assert view.stats()["draws"] == draws
     view.set_head(1, 0)
-    view.page.wait_for_function(f"freelook.stats().draws > {draws}")
+    view.until(f"freelook.stats().draws > {draws}")
 
 
 def test_the_views_outline_on_the_fisheye(view: PageView) -> None:
@@ -286,6 +287,7 @@ def pixel_sum(view: PageView, x: int, y: int) -> int:
 
 def test_keys_switch_picture_in_picture_and_split(view: PageView) -> None:
     view.put(gray_picture())
+    view.page.keyboard.press("i")  # no lines over the picture
     box = view.page.locator("#pip").bounding_box()
     corner = (int(box["x"]) + 4, int(box["y"]) + 4)
     view.set_head(180, 0)  # behind the camera: the view is black, the fisheye is not
@@ -302,6 +304,18 @@ def test_keys_switch_picture_in_picture_and_split(view: PageView) -> None:
     assert pixel_sum(view, 160, 240) == 0
 
 
+def test_the_horizon_is_where_the_vehicles_level_plane_is(view: PageView) -> None:
+    """Green along pitch 0, which a head turned 10 degrees up sees below the middle."""
+    view.set_head(15, 10)  # between two ticks
+    focal_px = Viewport((640, 480), 90.0).focal_px
+    row = round(239.5 + focal_px * np.tan(np.radians(10)))
+    green = [pixel_sum(view, 320, row + offset) for offset in range(-8, 9)]
+    assert abs(int(np.argmax(green)) - 8) <= 1
+    assert max(green) > 300
+    view.page.keyboard.press("i")
+    assert pixel_sum(view, 320, row) == 0
+
+
 def test_help_opens_and_closes(view: PageView) -> None:
     view.page.keyboard.press("h")
     view.shows("whole fisheye in a corner")
@@ -312,7 +326,7 @@ def test_help_opens_and_closes(view: PageView) -> None:
 def test_the_token_goes_along(open_page: Any, page_station: PageStation) -> None:
     page_station.token = "open sesame"
     page = open_page(query="?token=open%20sesame")
-    page.page.wait_for_function("freelook.stats().whep === 'lost'")
+    page.until("freelook.stats().whep === 'lost'")
     sent = {path: authorization for _, path, authorization in page_station.requests}
     assert sent["/api/station"] == sent["/whep"] == "Bearer open sesame"
 

@@ -44,13 +44,9 @@ export class App {
     this.settings = new Settings();
     this.zoom = new Zoom(station.hfov_deg);
     this.stage = /** @type {HTMLElement} */ (byId('stage'));
-    this.overlay = /** @type {HTMLCanvasElement} */ (byId('overlay'));
     this.renderer = new Renderer(byId('view'), shaderBody, new Camera(station.camera));
     document.documentElement.classList.toggle('software', this.renderer.software);
     byId('pip').style.aspectRatio = station.camera.size.join(' / ');
-    // Where software draws, lines are cheaper off the "GPU".
-    const options = { willReadFrequently: this.renderer.software };
-    this.context = /** @type {CanvasRenderingContext2D} */ (this.overlay.getContext('2d', options));
     this.link = new Link(this.wake, (rtp) => this.latency.frameTold(rtp));
     this.latency = new Latency(this.link);
     this.makeHeads();
@@ -152,7 +148,7 @@ export class App {
 
   /** @param {import('./hand.js').Aim} aim @param {number} nowMs */
   draw(aim, nowMs) {
-    this.fitCanvases();
+    this.fitCanvas();
     this.renderer.grey = this.stale(nowMs) ? 1 : 0;
     const { pip, split, instruments: lines } = this.settings.values;
     const key = [aim.q, this.zoom.fieldDeg, this.renderer.picture.version, this.renderer.grey, pip,
@@ -175,28 +171,28 @@ export class App {
     const { renderer, ratio } = this;
     const { main, forward, fisheye } = this.panes();
     const view = this.viewOn(main);
-    const { context } = this;
-    context.setTransform(this.overlayRatio, 0, 0, this.overlayRatio, 0, 0);
-    context.clearRect(0, 0, this.stage.clientWidth, this.stage.clientHeight);
     renderer.clear();
     renderer.drawView(scaled(main, ratio), q, view.hfovDeg);
-    if (this.settings.get('instruments')) drawHorizon(context, main, view, q);
-    if (forward) {
-      renderer.drawView(scaled(forward, ratio), IDENTITY, this.viewOn(forward).hfovDeg);
-      drawCaption(context, forward, 'STRAIGHT AHEAD');
-    }
-    if (fisheye) this.drawFisheye(context, fisheye, view, q);
-    if (this.settings.get('instruments')) drawTape(context, tapePlace(main, ['top', 'readings'].map((id) => rectOf(byId(id)))), q);
+    if (forward) renderer.drawView(scaled(forward, ratio), IDENTITY, this.viewOn(forward).hfovDeg);
+    const lines = this.settings.get('instruments');
+    const { pen } = renderer;
+    pen.begin(ratio);
+    if (lines) drawHorizon(pen, main, view, q);
+    if (lines) drawTape(pen, tapePlace(main, ['top', 'readings'].map((id) => rectOf(byId(id)))), q);
+    if (forward) drawCaption(pen, forward, 'STRAIGHT AHEAD');
+    pen.end();
+    if (fisheye) this.drawFisheye(fisheye, view, q);
     instruments.showField(view.hfovDeg);
   }
 
-  /** @param {CanvasRenderingContext2D} context @param {import('./renderer.js').Rect} rect
-   * @param {Viewport} view @param {Quaternion} q */
-  drawFisheye(context, rect, view, q) {
-    const { x, y, width, height } = this.renderer.drawFisheye(scaled(rect, this.ratio));
-    const r = this.ratio;
-    const place = { x: x / r, y: y / r, width: width / r, height: height / r };
-    drawOutline(context, place, this.renderer.camera, view, q);
+  /** @param {import('./renderer.js').Rect} rect @param {Viewport} view @param {Quaternion} q */
+  drawFisheye(rect, view, q) {
+    const { renderer, ratio } = this;
+    const { x, y, width, height } = renderer.drawFisheye(scaled(rect, ratio));
+    const place = { x: x / ratio, y: y / ratio, width: width / ratio, height: height / ratio };
+    renderer.pen.begin(ratio);
+    drawOutline(renderer.pen, place, renderer.camera, view, q);
+    renderer.pen.end();
   }
 
   panes() {
@@ -213,13 +209,12 @@ export class App {
   }
 
   /** Canvas pixels per CSS pixel; fewer where software draws. */
-  fitCanvases() {
+  fitCanvas() {
     const { clientWidth: width, clientHeight: height } = this.stage;
-    const most = this.renderer.software ? SOFTWARE_PIXELS : GPU_PIXELS;
-    this.overlayRatio = Math.min(devicePixelRatio, 2);
-    this.ratio = Math.min(this.overlayRatio, Math.sqrt(most / Math.max(1, width * height)));
+    const asked = Number(new URLSearchParams(location.search).get('pixels'));
+    const most = asked || (this.renderer.software ? SOFTWARE_PIXELS : GPU_PIXELS);
+    this.ratio = Math.min(devicePixelRatio, 2, Math.sqrt(most / Math.max(1, width * height)));
     fit(this.renderer.canvas, width, height, this.ratio);
-    fit(this.overlay, width, height, this.overlayRatio);
   }
 
   /** @param {number} nowMs */

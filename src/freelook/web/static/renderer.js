@@ -1,6 +1,7 @@
 // Draws views and whole fisheye pictures with WebGL2, on the canvas or into memory.
 
 import { LENS_UNIT, Picture, makeTexture } from './picture.js';
+import { Pen } from './pen.js';
 import { matrix, matrixProduct } from './quaternion.js';
 import { Shaders } from './shader.js';
 import { focalPx } from './viewport.js';
@@ -28,7 +29,8 @@ export class Renderer {
     this.shaders = new Shaders(gl, shaderBody);
     this.lens = makeTexture(gl, LENS_UNIT, gl.NEAREST);
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.R32F, profile.g.length, 1, 0, gl.RED, gl.FLOAT, profile.g);
-    gl.bindVertexArray(gl.createVertexArray());
+    this.pen = new Pen(gl);
+    this.noAttributes = gl.createVertexArray();
   }
 
   /** The GPU's name, or the software that stands in for one. */
@@ -128,6 +130,7 @@ export class Renderer {
   /** @param {string[]} defines */
   begin(defines) {
     const program = this.shaders.use([...this.picture.defines, ...defines]);
+    this.gl.bindVertexArray(this.noAttributes);
     this.picture.bind(program);
     this.gl.uniform1f(program.at('grey'), this.grey);
     const { width, height } = this.picture;

@@ -32,33 +32,37 @@ export class Shaders {
 
   /** @param {string[]} defines @returns {Program} */
   build(defines) {
-    const { gl } = this;
     const head = HEADER + defines.map((name) => `#define ${name}\n`).join('');
-    const handle = /** @type {WebGLProgram} */ (gl.createProgram());
-    gl.attachShader(handle, this.compile(gl.VERTEX_SHADER, VERTEX));
-    gl.attachShader(handle, this.compile(gl.FRAGMENT_SHADER, head + this.body));
-    gl.linkProgram(handle);
-    if (!gl.getProgramParameter(handle, gl.LINK_STATUS)) {
-      throw new Error(`shader (${defines}): ${gl.getProgramInfoLog(handle)}`);
-    }
-    /** @type {Map<string, WebGLUniformLocation | null>} */
-    const places = new Map();
-    const at = (/** @type {string} */ name) => {
-      if (!places.has(name)) places.set(name, gl.getUniformLocation(handle, name));
-      return places.get(name) ?? null;
-    };
-    return { handle, at };
+    return buildProgram(this.gl, VERTEX, head + this.body);
   }
+}
 
-  /** @param {number} kind @param {string} text */
-  compile(kind, text) {
-    const { gl } = this;
-    const shader = /** @type {WebGLShader} */ (gl.createShader(kind));
-    gl.shaderSource(shader, text);
-    gl.compileShader(shader);
-    if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) {
-      throw new Error(`shader: ${gl.getShaderInfoLog(shader)}`);
-    }
-    return shader;
+/** Throws an Error with the compiler's words. @param {WebGL2RenderingContext} gl
+ * @param {string} vertex @param {string} fragment @returns {Program} */
+export function buildProgram(gl, vertex, fragment) {
+  const handle = /** @type {WebGLProgram} */ (gl.createProgram());
+  gl.attachShader(handle, compile(gl, gl.VERTEX_SHADER, vertex));
+  gl.attachShader(handle, compile(gl, gl.FRAGMENT_SHADER, fragment));
+  gl.linkProgram(handle);
+  if (!gl.getProgramParameter(handle, gl.LINK_STATUS)) {
+    throw new Error(`shader: ${gl.getProgramInfoLog(handle)}`);
   }
+  /** @type {Map<string, WebGLUniformLocation | null>} */
+  const places = new Map();
+  const at = (/** @type {string} */ name) => {
+    if (!places.has(name)) places.set(name, gl.getUniformLocation(handle, name));
+    return places.get(name) ?? null;
+  };
+  return { handle, at };
+}
+
+/** @param {WebGL2RenderingContext} gl @param {number} kind @param {string} text */
+function compile(gl, kind, text) {
+  const shader = /** @type {WebGLShader} */ (gl.createShader(kind));
+  gl.shaderSource(shader, text);
+  gl.compileShader(shader);
+  if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) {
+    throw new Error(`shader: ${gl.getShaderInfoLog(shader)}`);
+  }
+  return shader;
 }
