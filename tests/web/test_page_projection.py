@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 from page_station import PageView
@@ -110,14 +112,14 @@ def rgb_of(y: Floats, u: Floats, v: Floats, color: ColorSpace) -> Floats:
     return np.clip(np.stack([red, green, blue], -1), 0, 1) * 255
 
 
-@pytest.mark.parametrize("matrix", ["bt601", "bt709"])
-@pytest.mark.parametrize("full_range", [False, True])
+MATRICES: tuple[Matrix, ...] = ("bt601", "bt709")
+SPACES = [ColorSpace(matrix, full) for matrix in MATRICES for full in (False, True)]
+COLOURS = [(16, 128, 128), (235, 128, 128), (81, 90, 200), (120, 200, 60), (60, 60, 90)]
+
+
 @pytest.mark.parametrize("layout", ["i420", "nv12"])
-def test_colours_are_those_of_the_standard(
-    view: PageView, layout: str, matrix: Matrix, full_range: bool
-) -> None:
-    color = ColorSpace(matrix, full_range)
-    for y, u, v in [(16, 128, 128), (235, 128, 128), (81, 90, 200), (120, 200, 60), (60, 60, 90)]:
+def test_colours_are_those_of_the_standard(view: PageView, layout: str) -> None:
+    for color, (y, u, v) in product(SPACES, COLOURS):
         planes = [np.full((240, 320), y), np.full((120, 160), u), np.full((120, 160), v)]
         i420 = tuple(plane.astype(np.uint8) for plane in planes)
         nv12 = (i420[0], np.stack(i420[1:], -1))

@@ -47,6 +47,8 @@ def pose(page: PageView, yaw_deg: float, pitch_deg: float, state: str = "trackin
 def tracked(open_page: Any) -> PageView:
     """A page whose view the tracker 'opentrack' commands, looking 30 right, 10 up."""
     page: PageView = open_page(trackers=["opentrack", "second"])
+    page.js("""setInterval(() => freelook.app.link.receive(
+        '{"type": "pong", "t": 0, "ns": 0}', performance.now()), 100)""")  # the station lives
     pose(page, 30, 10)
     return page
 
