@@ -103,6 +103,7 @@ def test_whep_says_what_it_takes() -> None:
         (lambda sdp: sdp.replace("m=video", "m=audio"), 400, "no video"),
         (lambda sdp: sdp.replace("a=recvonly", "a=sendonly"), 400, "must be recvonly"),
         (lambda sdp: sdp.replace("H264", "H265"), 406, "only H.264"),
+        (lambda sdp: sdp.replace("mode=1", "mode=0"), 406, "no codec in common"),
         (lambda sdp: sdp.replace("a=ice-ufrag", "a=ice-cream"), 400, "cannot be answered"),
         (lambda sdp: sdp + "a=x\r\n" * 20000, 413, "larger than"),
         (lambda sdp: b"\xff\xfe\x00", 400, "not UTF-8"),

@@ -113,11 +113,12 @@ def test_a_lost_picture_is_sent_again(received: Units) -> None:
         await until(lambda: len(received) >= 3, "pictures")
         [receiver] = viewer.pc.getReceivers()
         [ssrc] = receiver._RTCRtpReceiver__remote_streams
-        await receiver._send_rtcp_pli(ssrc)
+        for _ in range(5):
+            await receiver._send_rtcp_pli(ssrc)
         counters = only_viewer(station).counters
-        await until(lambda: counters["replays"] == 1, "replay")
-        assert counters["pictures_lost"] == 1
+        await until(lambda: counters["pictures_lost"] == 5, "five complaints")
         await until(lambda: counters["sent"] == 8, "the same four pictures")
+        assert counters["replays"] == 1
         camera.send()
         await until(lambda: counters["sent"] == 9, "one more")
         await viewer.close()
@@ -230,9 +231,24 @@ def test_a_full_channel_is_skipped_and_counted() -> None:
         assert sent.index(False) <= 5
         assert viewer.counters["messages_skipped"] == sent.count(False)
         await until(lambda: viewer.send('{"type":"after"}'), "room again")
+        counters = station.station.status()["source"]["counters"]
+        assert counters["viewers_messages_skipped"] == viewer.counters["messages_skipped"]
         await peer.close()
 
     flown(test)
+
+
+def test_a_pose_that_found_the_channel_full_comes_later() -> None:
+    async def test(station: Bench) -> None:
+        peer = await station.viewer()
+        await until(lambda: peer.last("pose"), "first pose")
+        while only_viewer(station).send(json.dumps({"type": "fill", "x": "y" * 4000})):
+            pass
+        station.station.control("script", "disable")
+        await until(lambda: peer.last("pose")["state"] == "disabled", "the pose")
+        await peer.close()
+
+    flown(test, "script")
 
 
 def test_status_comes_four_times_a_second() -> None:

@@ -65,7 +65,7 @@ def status(source: dict[str, Any], trackers: Iterable[HeadStatus], viewers: int)
 
 
 def source_status(
-    ingest: IngestStatus, why_transcode: str | None, trouble: str | None, extra: dict[str, int]
+    ingest: IngestStatus, why_transcode: str | None, trouble: str | None, counters: dict[str, int]
 ) -> dict[str, Any]:
     stream = ingest.stream
     return {
@@ -75,7 +75,7 @@ def source_status(
         "codec": stream.codec if stream else None,
         "size": [stream.width, stream.height] if stream and stream.width else None,
         "transcoding": why_transcode,
-        "counters": ingest.counters | extra,
+        "counters": counters,
     }
 
 
@@ -95,9 +95,9 @@ def milliseconds(nanoseconds: int | None) -> float | None:
     return None if nanoseconds is None else round(nanoseconds / NS_PER_MS, 1)
 
 
-def counts(counters: Counters) -> dict[str, int]:
+def counts(counters: Counters, prefix: str = "") -> dict[str, int]:
     """A copy of counters that other threads go on counting in."""
-    return dict(counters.values)
+    return {prefix + name: value for name, value in list(counters.values.items())}
 
 
 def _tracker(head: HeadStatus) -> dict[str, Any]:

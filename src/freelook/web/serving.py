@@ -149,9 +149,10 @@ def _why_not_listening(host: str, port: int, error: OSError | OverflowError) -> 
 
 def _addresses(host: str) -> list[str]:
     """Where a browser finds us, the most useful first."""
-    if host in ANY_ADDRESS:
-        return [*security.local_addresses(), "127.0.0.1"]
-    return [host]
+    if host not in ANY_ADDRESS:
+        return [host]
+    found = [a for a in security.local_addresses() if host == "::" or ":" not in a]
+    return [*found, "127.0.0.1"]
 
 
 def _tls(

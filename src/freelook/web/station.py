@@ -15,9 +15,9 @@ from typing import Any
 from .. import __version__
 from ..camera import Camera
 from ..clock import Clock, now_ns
+from ..gimbal import Aim
 from ..head import Head
 from ..ingest import Ingest
-from ..types import Counters
 from . import messages
 from .feed import Feed
 from .units import Hub
@@ -56,7 +56,6 @@ class Station:
         most_viewers: int = 16,
         clock: Clock = now_ns,
     ) -> None:
-        self.counters = Counters()
         self.viewers: Viewers
         self._ingest = ingest
         self._camera = camera
@@ -65,6 +64,7 @@ class Station:
         self._most_viewers = most_viewers
         self._clock = clock
         self._pose_pending = dict.fromkeys(self._heads, False)
+        self._missed = dict.fromkeys(self._heads, False)
         self._states: dict[str, str] = {}
 
     async def start(self) -> None:
@@ -117,7 +117,12 @@ class Station:
         now = self._clock()
         ingest = self._ingest.status(now)
         trouble = self._feed.error or wrong_shape(self._camera.size, ingest.stream)
-        counters = messages.counts(self._hub.counters) | messages.counts(self._feed.counters)
+        counters = (
+            ingest.counters
+            | messages.counts(self._feed.counters)
+            | messages.counts(self._hub.counters, "relay_")
+            | messages.counts(self.viewers.counters(), "viewers_")
+        )
         source = messages.source_status(ingest, self._feed.why, trouble, counters)
         trackers = [head.status(now) for head in self._heads.values()]
         return messages.status(source, trackers, len(self.viewers))
@@ -158,17 +163,23 @@ class Station:
     def _push_pose(self, name: str) -> None:
         self._pose_pending[name] = False
         if len(self.viewers):
-            self._send_all(self._pose_message(name))
+            self._missed[name] = not self._send_all(self._pose_message(name))
 
-    def _send_all(self, message: str) -> None:
-        for viewer in self.viewers:
-            viewer.send(message)
+    def _send_all(self, message: str) -> bool:
+        """False when a viewer that listens did not get it."""
+        sent = [viewer.send(message) for viewer in self.viewers if viewer.listening]
+        return all(sent)
 
     def _pose_message(self, name: str) -> str:
         now = self._clock()
         aim = self._heads[name].aim(now)
         self._states[name] = aim.state
         return messages.pose(name, aim, now)
+
+    def _is_due(self, name: str, aim: Aim) -> bool:
+        """Whether viewers have to be told without a new pose."""
+        changed = aim.state != self._states.get(name)
+        return aim.moving or aim.state == "holding" or changed or self._missed[name]
 
     async def _tick(self) -> None:
         ticks = 0
@@ -178,8 +189,7 @@ class Station:
             if not len(self.viewers):
                 continue
             for name, head in self._heads.items():
-                aim = head.aim(self._clock())
-                if aim.moving or aim.state == "holding" or aim.state != self._states.get(name):
+                if self._is_due(name, head.aim(self._clock())):
                     self._push_pose(name)
             if ticks % TICKS_PER_STATUS == 0:
                 self._send_all(messages.text(self.status()))

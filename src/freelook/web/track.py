@@ -25,7 +25,6 @@ FRAME_STEP = RTP_HZ // 30
 # Replayed pictures are a tick apart, so that the browser shows the last one at once, and leave
 # at this pace, so that they fit into the receiver's socket buffer.
 REPLAY_BYTES_PER_S = 6_000_000
-REPLAY_PAUSE_S = 0.5
 
 FrameListener = Callable[[int, int], None]
 
@@ -62,7 +61,7 @@ class UnitTrack(MediaStreamTrack):
     """The pictures of a hub, from the last key picture on.
 
     `on_frame(rtp, capture_ns)` is called for each picture as it goes out, with the time stamp
-    as it is on the wire; not before the first packet has gone, see `rtp_origin`.
+    as it is on the wire; not before the first packet has gone, see `last_rtp_timestamp`.
     """
 
     kind = "video"
@@ -77,7 +76,6 @@ class UnitTrack(MediaStreamTrack):
         self._queue = UnitQueue(counters=counters)
         self._replay: deque[AccessUnit] = deque()
         self._newest_replayed_ns = 0
-        self._replay_again_s = 0.0
         self._ready = asyncio.Event()
         self._origin: int | None = None
         self._unsubscribe: Callable[[], None] | None = None
@@ -88,25 +86,19 @@ class UnitTrack(MediaStreamTrack):
         if self._unsubscribe is None:
             self._unsubscribe = self._hub.subscribe(self._deliver)
             self._start_replay()
-        if self._replay:
-            return await self._replayed()
-        while (unit := self._queue.take()) is None:
-            self._ready.clear()
-            await self._ready.wait()
+        while True:
             if self._replay:
                 return await self._replayed()
-        return self._packet(unit, self._clock.stamp(unit.capture_ns))
+            if (unit := self._queue.take()) is not None:
+                return self._packet(unit, self._clock.stamp(unit.capture_ns))
+            self._ready.clear()
+            await self._ready.wait()
 
     def resend(self) -> None:
-        """The viewer lost its picture (PLI): send again from the last key picture.
-
-        Not more than twice a second.
-        """
-        now_s = asyncio.get_running_loop().time()
-        if now_s < self._replay_again_s or self._replay:
-            return
-        self._start_replay()
-        self._ready.set()
+        """Send again from the last key picture, if it is still here."""
+        if not self._replay:
+            self._start_replay()
+            self._ready.set()
 
     def stop(self) -> None:
         super().stop()
@@ -123,7 +115,6 @@ class UnitTrack(MediaStreamTrack):
             return
         self._replay.extend(units)
         self._newest_replayed_ns = units[-1].capture_ns
-        self._replay_again_s = asyncio.get_running_loop().time() + REPLAY_PAUSE_S
         self._queue.follow()
         self._counters.add("replays")
 

@@ -8,10 +8,11 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import secrets
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine, Iterator
 from typing import Any, Protocol
 
 from aiortc import RTCConfiguration, RTCPeerConnection, RTCRtpSender, RTCSessionDescription
+from aiortc.exceptions import InvalidStateError, OperationError
 from aiortc.sdp import SessionDescription, candidate_from_sdp
 
 from ..types import Counters
@@ -20,8 +21,10 @@ from .units import Hub
 
 CONNECT_S = 20.0
 CLOSE_S = 5.0
-# A data channel that holds more than this is not keeping up; what is newest comes later.
-FULL_BYTES = 16_384
+# Room for one status and some poses; a channel that holds more is not keeping up.
+FULL_BYTES = 2_000
+# How soon after a lost picture the next one is answered.
+LOST_PAUSE_S = 0.5
 
 
 class Refused(Exception):  # noqa: N818 - an answer, not a failure
@@ -54,6 +57,7 @@ class Viewer:
         self.counters = Counters()
         self._events = events
         self._channel: Any = None
+        self._lost_again_s = 0.0
         self._closing: asyncio.Task[None] | None = None
         self._tasks: set[asyncio.Task[None]] = set()
         self._pc = RTCPeerConnection(RTCConfiguration(iceServers=[]))
@@ -78,6 +82,10 @@ class Viewer:
         try:
             await self._pc.setRemoteDescription(RTCSessionDescription(now, "offer"))
             await self._pc.setLocalDescription(await self._pc.createAnswer())
+        except OperationError as error:
+            raise Refused(
+                406, f"no codec in common; H.264 comes as profile 42e01f, mode 1 ({error})"
+            ) from error
         except Exception as error:  # aiortc raises all kinds for offers that make no sense
             raise Refused(400, f"this offer cannot be answered: {error!r}") from error
         self._spawn(self._expect_connection())
@@ -96,8 +104,10 @@ class Viewer:
         if self._channel.bufferedAmount > FULL_BYTES:
             self.counters.add("messages_skipped")
             return False
-        with contextlib.suppress(Exception):  # closing at this moment
+        try:
             self._channel.send(text)
+        except (InvalidStateError, ConnectionError):  # closing at this moment
+            return False
         return True
 
     async def close(self) -> None:
@@ -116,7 +126,7 @@ class Viewer:
         finally:
             self._events.gone(self)
 
-    def _spawn(self, work: Any) -> None:
+    def _spawn(self, work: Coroutine[Any, Any, None]) -> None:
         task = asyncio.ensure_future(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
@@ -154,6 +164,10 @@ class Viewer:
 
     def _picture_lost(self) -> None:
         self.counters.add("pictures_lost")
+        now_s = asyncio.get_running_loop().time()
+        if now_s < self._lost_again_s:
+            return
+        self._lost_again_s = now_s + LOST_PAUSE_S
         if not self._events.wants_key(self):
             self._track.resend()
 
@@ -188,6 +202,11 @@ def split_mdns(offer: str) -> tuple[str, list[str]]:
     return "\r\n".join(kept) + "\r\n", hidden
 
 
+def add_counts(total: Counters, more: Counters) -> None:
+    for name, value in more.values.items():
+        total.add(name, value)
+
+
 class Viewers:
     """All WHEP sessions of a station."""
 
@@ -202,12 +221,13 @@ class Viewers:
         self._events = events
         self._limit = limit
         self._on_change = on_change
+        self._past = Counters()
         self._sessions: dict[str, Viewer] = {}
 
     def __len__(self) -> int:
         return len(self._sessions)
 
-    def __iter__(self) -> Any:
+    def __iter__(self) -> Iterator[Viewer]:
         return iter(tuple(self._sessions.values()))
 
     async def add(self, offer: str) -> tuple[str, str]:
@@ -235,7 +255,15 @@ class Viewers:
 
     def forget(self, viewer: Viewer) -> None:
         if self._sessions.pop(viewer.id, None) is not None:
+            add_counts(self._past, viewer.counters)
             self._on_change(len(self))
+
+    def counters(self) -> Counters:
+        """Summed over all viewers there are and were."""
+        total = Counters()
+        for counters in (self._past, *(viewer.counters for viewer in self)):
+            add_counts(total, counters)
+        return total
 
     async def close(self) -> None:
         await asyncio.gather(*(viewer.close() for viewer in self))
