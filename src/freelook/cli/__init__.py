@@ -22,9 +22,10 @@ EXTRA_OF = {
     "aiortsp": "rtsp",
     "av": "video",
     "cryptography": "web",
+    "ifaddr": "web",
     "cv2": "render",
     "numba": "render",
-    "playwright": "dev",
+    "playwright": "bench",
     "rich": "cli",
 }
 
