@@ -173,7 +173,7 @@ def _runway() -> Iterator[tuple[int, Row]]:
 
 
 def _ground_letters() -> Iterator[tuple[int, Row]]:
-    for name, north, east in (("F", 395, 0), ("R", -40, 150), ("7", -395, 0), ("L", 0, -75)):
+    for name, north, east in (("F", 395, 0), ("R", -40, 205), ("7", -395, 0), ("L", 0, -75)):
         yield letter(name, north, east, 0, 60, WHITE)
 
 
@@ -208,8 +208,8 @@ def _landmarks() -> Iterator[tuple[int, Row]]:
     balloons = (
         (330.0, 130.0, 115.0, RED, WHITE),
         (40.0, 420.0, 140.0, BLUE, YELLOW),
-        (-330.0, -150.0, 105.0, YELLOW, (0.85, 0.35, 0.1)),
-        (90.0, -260.0, 120.0, GREEN, WHITE),
+        (-300.0, -60.0, 105.0, YELLOW, (0.85, 0.35, 0.1)),
+        (130.0, -250.0, 120.0, GREEN, WHITE),
     )
     for north, east, height, color, other in balloons:
         yield ball(north, east, height, 16, color, other, 8)

@@ -106,8 +106,10 @@ def _find(view, cone, listed):  # type: ignore[no-untyped-def]
     count = 0
     for k in range(len(view.order)):
         other = view.cones[k]
-        # cosine of the angle between the axes against that of the sum of both half angles
-        if ax * other[0] + ay * other[1] + az * other[2] >= other[3] * cone[3] - other[4] * cone[4]:
+        # the angle between the axes against the sum of both half angles, each below 90 degrees
+        along = ax * other[0] + ay * other[1] + az * other[2]
+        meets = along >= other[3] * cone[3] - other[4] * cone[4]
+        if meets or cone[3] <= 0 or other[3] < F(-1):
             listed[count] = k
             count += 1
     return count
