@@ -14,6 +14,7 @@ from freelook.sources import open_source
 from video_streams import GOP, rtp_datagrams, transport_stream, with_sequence, with_ssrc, write
 
 PICTURES = 2 * GOP
+LOOKS_LIKE_RTP = st.binary(min_size=12, max_size=40).map(lambda b: b"\x80\x60" + b)
 
 
 def send(port: int, datagrams: list[bytes]) -> None:
@@ -128,15 +129,16 @@ def test_multicast_is_joined() -> None:
     units.close()
 
 
-@given(st.lists(st.binary(max_size=100), min_size=1, max_size=10))
-def test_garbage_before_the_stream_is_counted(garbage: list[bytes]) -> None:
-    source = open_rtp()
+@given(st.lists(st.binary(max_size=100) | LOOKS_LIKE_RTP, min_size=1, max_size=10))
+def test_garbage_before_the_stream_is_got_over(garbage: list[bytes]) -> None:
+    """Even garbage that looks like a sender of its own only delays the stream."""
+    clock_ns = iter(range(0, 10**18, 10**8))
+    source: Any = open_source("rtp://127.0.0.1:0", clock=lambda: next(clock_ns))
     send(source.port, garbage + list(rtp_datagrams("h264")))
     units = source.units()
-    assert next(units).key
+    assert any(unit.key for unit in units)
     units.close()
-    counted = sum(source.counters[n] for n in ("malformed", "foreign", "undecided", "restarts"))
-    assert counted >= 1 or source.counters["packets"] > len(garbage)
+    assert source.counters["packets"] + source.counters["malformed"] > len(garbage)
 
 
 def test_transport_stream_by_udp() -> None:
