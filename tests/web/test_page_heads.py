@@ -73,7 +73,7 @@ def test_the_wheel_zooms_within_10_and_150_degrees(view: PageView) -> None:
         view.until(f"freelook.stats().fieldDeg === {limit}")
 
 
-TOUCH = """([id, type, x, y]) => freelook.app.stage.dispatchEvent(new PointerEvent(type,
+TOUCH = """([id, type, x, y]) => freelook.app.screen.stage.dispatchEvent(new PointerEvent(type,
     {pointerId: id, pointerType: 'touch', clientX: x, clientY: y, bubbles: true}))"""
 
 

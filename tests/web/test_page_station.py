@@ -277,8 +277,8 @@ def pixel_sum(view: PageView, x: int, y: int) -> int:
     """What the page's canvas shows there just after drawing."""
     return int(
         view.js(
-            """([x, y]) => { const a = freelook.app, gl = a.renderer.gl; a.drawnKey = '';
-            a.drawNow(); const p = new Uint8Array(4); const r = a.ratio;
+            """([x, y]) => { const a = freelook.app, gl = a.renderer.gl; a.screen.drawnKey = '';
+            a.drawNow(); const p = new Uint8Array(4); const r = a.screen.ratio;
             gl.readPixels(x * r, a.renderer.canvas.height - y * r, 1, 1, gl.RGBA,
                 gl.UNSIGNED_BYTE, p);
             return p[0] + p[1] + p[2]; }""",

@@ -25,6 +25,8 @@ export class Gamepads {
   constructor(to) {
     this.to = to;
     this.steppedMs = 0;
+    /** the stick at the last step, when it gives directions */
+    this.last = { x: 0, y: 0 };
     /** @type {Set<string>} buttons that were down at the last step */
     this.down = new Set();
     window.addEventListener('gamepadconnected', () => to.wake());
@@ -65,9 +67,8 @@ export class Gamepads {
   /** @param {number} x @param {number} y @param {number} nowMs */
   point(x, y, nowMs) {
     const { command, settings } = this.to;
-    const moved = x !== this.lastX || y !== this.lastY;
-    if (!moved || (this.lastX === undefined && !x && !y)) return;
-    [this.lastX, this.lastY] = [x, y];
+    if (x === this.last.x && y === this.last.y) return;
+    this.last = { x, y };
     command.takeByHand(nowMs);
     command.turnByHand({
       yaw: x * REACH_DEG.yaw * settings.gain('gamepad', 'yaw') - command.hand.angles.yaw,

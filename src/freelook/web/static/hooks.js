@@ -21,7 +21,7 @@ import { toAngles } from './quaternion.js';
 export function makeHooks(app) {
   /** @type {import('./viewport.js').Viewport | null} */
   let chosen = null;
-  const view = () => chosen ?? wholePixels(app.viewOn(app.panes().main));
+  const view = () => chosen ?? wholePixels(app.screen.viewOn(app.screen.panes().main));
   const q = () => app.command.aim(performance.now()).q;
   return {
     ready: true,

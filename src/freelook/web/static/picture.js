@@ -19,7 +19,8 @@ export class Picture {
     this.formats = ['', '', ''];
     /** grows with each upload; 0: no picture yet */
     this.version = 0;
-    [this.width, this.height] = [0, 0];
+    this.width = 0;
+    this.height = 0;
     /** @type {'RGB' | 'PLANES' | 'NV12'} */
     this.layout = 'RGB';
     /** @type {ColorSpace} */
@@ -72,7 +73,8 @@ export class Picture {
 
   /** @param {number} width @param {number} height */
   changed(width, height) {
-    [this.width, this.height] = [width, height];
+    this.width = width;
+    this.height = height;
     this.version += 1;
   }
 

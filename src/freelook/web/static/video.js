@@ -9,6 +9,9 @@ import { colorSpace } from './colour.js';
 /** @typedef {{receivedMs: number | null, rtp: number | null}} FrameTimes
  * when its last packet came, page time; RTP time stamp as sent */
 
+/** @type {Record<string, number[]>} of each plane, for the pixel formats our shader reads */
+const CHANNELS = { I420: [1, 1, 1], NV12: [1, 2] };
+
 export class VideoFeed {
   /**
    * @param {HTMLVideoElement} video @param {import('./picture.js').Picture} picture
@@ -90,7 +93,7 @@ export class VideoFeed {
   async copyPlanes() {
     const frame = new VideoFrame(this.video);
     try {
-      const channels = { I420: [1, 1, 1], NV12: [1, 2] }[frame.format ?? ''];
+      const channels = CHANNELS[frame.format ?? ''];
       if (!channels) throw new Error(`pixel format ${frame.format}`);
       const rect = frame.visibleRect ?? new DOMRectReadOnly(0, 0, frame.codedWidth, frame.codedHeight);
       const color = colorSpace(frame.colorSpace, rect.height);

@@ -1,0 +1,109 @@
+// The stage: which panes there are, and what is drawn in each.
+
+import * as instruments from './instruments.js';
+import { panes, scaled, tapePlace } from './layout.js';
+import { drawCaption, drawHorizon, drawOutline, drawTape } from './overlay.js';
+import { IDENTITY } from './quaternion.js';
+import { spanning } from './viewport.js';
+
+/** @typedef {import('./quaternion.js').Quaternion} Quaternion */
+/** @typedef {import('./viewport.js').Viewport} Viewport */
+/** @typedef {import('./renderer.js').Rect} Rect */
+
+const SOFTWARE_PIXELS = 960 * 540;
+const GPU_PIXELS = 3840 * 2160;
+const MOST_RATIO = 2;
+
+export class Screen {
+  /** @param {HTMLElement} stage @param {import('./renderer.js').Renderer} renderer
+   * @param {import('./settings.js').Settings} settings @param {import('./zoom.js').Zoom} zoom */
+  constructor(stage, renderer, settings, zoom) {
+    this.stage = stage;
+    this.renderer = renderer;
+    this.settings = settings;
+    this.zoom = zoom;
+    this.pip = byId('pip');
+    this.pip.style.aspectRatio = renderer.profile.size.join(' / ');
+    /** canvas pixels per CSS pixel */
+    this.ratio = 1;
+    const asked = Number(new URLSearchParams(location.search).get('pixels'));
+    this.mostPixels = asked || (renderer.software ? SOFTWARE_PIXELS : GPU_PIXELS);
+    this.drawnKey = '';
+  }
+
+  panes() {
+    const { clientWidth, clientHeight } = this.stage;
+    const { pip, split } = this.settings.values;
+    this.pip.hidden = !pip || split === 1;
+    return panes(clientWidth, clientHeight, split, pip ? rectOf(this.pip) : null);
+  }
+
+  /** @param {{width: number, height: number}} pane @returns {Viewport} */
+  viewOn({ width, height }) {
+    return spanning(width, height, this.zoom.fieldDeg);
+  }
+
+  /** Draws unless the same is there already; returns whether it did. @param {Quaternion} q */
+  draw(q) {
+    this.fitCanvas();
+    const { renderer, zoom, settings: { values }, stage } = this;
+    const key = [q, zoom.fieldDeg, renderer.picture.version, renderer.grey, values.pip,
+      values.split, values.instruments, stage.clientWidth, stage.clientHeight].join();
+    if (key === this.drawnKey) return false;
+    this.drawnKey = key;
+    this.drawPanes(q);
+    return true;
+  }
+
+  /** @param {Quaternion} q */
+  drawPanes(q) {
+    const { renderer, ratio } = this;
+    const { main, forward, fisheye } = this.panes();
+    const view = this.viewOn(main);
+    renderer.clear();
+    renderer.drawView(scaled(main, ratio), q, view.hfovDeg);
+    if (forward) renderer.drawView(scaled(forward, ratio), IDENTITY, this.viewOn(forward).hfovDeg);
+    renderer.pen.begin(ratio);
+    if (this.settings.get('instruments')) this.drawLines(main, view, q);
+    if (forward) drawCaption(renderer.pen, forward, 'STRAIGHT AHEAD');
+    renderer.pen.end();
+    if (fisheye) this.drawFisheye(fisheye, view, q);
+    instruments.showField(view.hfovDeg);
+  }
+
+  /** @param {Rect} main @param {Viewport} view @param {Quaternion} q */
+  drawLines(main, view, q) {
+    const { pen } = this.renderer;
+    drawHorizon(pen, main, view, q);
+    drawTape(pen, tapePlace(main, [byId('top'), byId('readings')].map(rectOf)), q);
+  }
+
+  /** @param {Rect} rect @param {Viewport} view @param {Quaternion} q */
+  drawFisheye(rect, view, q) {
+    const { renderer, ratio } = this;
+    const { x, y, width, height } = renderer.drawFisheye(scaled(rect, ratio));
+    const place = { x: x / ratio, y: y / ratio, width: width / ratio, height: height / ratio };
+    renderer.pen.begin(ratio);
+    drawOutline(renderer.pen, place, renderer.camera, view, q);
+    renderer.pen.end();
+  }
+
+  /** Fewer canvas pixels where software draws; the browser enlarges. */
+  fitCanvas() {
+    const { clientWidth: width, clientHeight: height } = this.stage;
+    const fitting = Math.sqrt(this.mostPixels / Math.max(1, width * height));
+    this.ratio = Math.min(devicePixelRatio, MOST_RATIO, fitting);
+    const { canvas } = this.renderer;
+    const size = [width, height].map((length) => Math.max(1, Math.round(length * this.ratio)));
+    if (canvas.width !== size[0]) canvas.width = size[0];
+    if (canvas.height !== size[1]) canvas.height = size[1];
+  }
+}
+
+const byId = (/** @type {string} */ id) => /** @type {HTMLElement} */ (document.getElementById(id));
+
+/** @param {HTMLElement} element @returns {Rect} */
+function rectOf(element) {
+  const { x, y, width, height } = element.getBoundingClientRect();
+  return { x, y, width, height };
+}
