@@ -5,6 +5,7 @@ from __future__ import annotations
 import av
 import numpy as np
 import pytest
+from av.video.codeccontext import VideoCodecContext
 
 from freelook.color import i420_from_rgb, rgb24_from_rgb, rgb_from_picture
 from freelook.errors import RenderError
@@ -19,16 +20,22 @@ SPACES = [ColorSpace(), ColorSpace("bt601", full_range=True)]
 PARAMETER_SETS = {"h264": {7, 8}, "hevc": {32, 33, 34}}
 
 
-def scene(shift: float = 0.0) -> np.ndarray:  # type: ignore[type-arg]
+def scene(shift: float = 0.0) -> np.ndarray:
     y, x = np.mgrid[0 : SIZE[1], 0 : SIZE[0]]
     waves = (np.sin((x + shift) / 29), np.sin(y / 23), np.sin((x + y) / 41))
     return 0.5 + 0.4 * np.stack(waves, axis=-1)
 
 
-def decode(codec: str, data: bytes) -> Picture:
+def new_decoder(codec: str) -> VideoCodecContext:
     decoder = av.CodecContext.create(codec, "r")
+    assert isinstance(decoder, VideoCodecContext)
+    return decoder
+
+
+def decode(codec: str, data: bytes) -> Picture:
+    decoder = new_decoder(codec)
     packet = av.Packet(data)
-    frames = [*decoder.decode(packet), *decoder.decode(None)]  # type: ignore[attr-defined]
+    frames = [*decoder.decode(packet), *decoder.decode(None)]
     assert len(frames) == 1
     return picture_from_av(frames[0])
 
@@ -63,13 +70,13 @@ def test_each_frame_comes_out_at_once_with_its_times(codec: str) -> None:
 @pytest.mark.parametrize("codec", ["h264", "h265"])
 def test_the_stamp_is_read_through_the_codec(codec: str) -> None:
     encoder = Encoder(SIZE, codec=codec, bitrate=300_000)
-    decoder = av.CodecContext.create("h264" if codec == "h264" else "hevc", "r")
+    decoder = new_decoder("h264" if codec == "h264" else "hevc")
     seen = []
     for index in range(12):
         picture = i420_from_rgb(scene(9 * index), ColorSpace())
         draw_stamp(picture.planes[0], index * 33_333_000)
         (unit,) = encoder.encode(Frame(picture, 0))
-        for frame in decoder.decode(av.Packet(unit.data)):  # type: ignore[attr-defined]
+        for frame in decoder.decode(av.Packet(unit.data)):
             seen.append(read_stamp(picture_from_av(frame).planes[0]))
     assert len(seen) >= 9
     assert seen == [index * 33_333_000 for index in range(len(seen))]

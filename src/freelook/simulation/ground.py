@@ -33,7 +33,7 @@ from .scratch import (
 
 SHADE = F(0.50)
 GRAIN_LEVELS = F(4)  # blurred more than this, the grain is gone
-ROUND_EDGES = F(1.5)  # the ramp of a round edge reaches a little farther than that of a straight
+EDGES = F(2)  # no soft edge reaches farther than this, in blurs along both axes together
 FARTHEST_PAINT_M = F(5000.0)
 
 
@@ -80,7 +80,7 @@ def _places(p, softness, per_m, s):  # type: ignore[no-untyped-def]
         blur = softness * t
         bn, be = stretched(blur, s[DN + k] / down), stretched(blur, s[DE + k] / down)
         s[T + k], s[NORTH + k], s[EAST + k], s[BLUR_N + k], s[BLUR_E + k] = t, n, e, bn, be
-        bn, be = ROUND_EDGES * bn, ROUND_EDGES * be
+        bn = be = EDGES * (bn + be)
         s[LEVEL + k] = log2(blur * per_m / (down * np.sqrt(np.sqrt(down))))
         s[LIGHT + k] = F(1)
         near = t < FARTHEST_PAINT_M
@@ -144,8 +144,8 @@ def _shape(kind, row, glyphs, softness, s):  # type: ignore[no-untyped-def]
     reach_n, reach_e = row[1] - middle_n, row[3] - middle_e
     for k in range(TILE):
         n, e, t = s[NORTH + k] - middle_n, s[EAST + k] - middle_e, s[T + k]
-        bn, be = ROUND_EDGES * s[BLUR_N + k], ROUND_EDGES * s[BLUR_E + k]
-        outside = abs(n) > reach_n + bn or abs(e) > reach_e + be
+        edge = EDGES * (s[BLUR_N + k] + s[BLUR_E + k])
+        outside = abs(n) > reach_n + edge or abs(e) > reach_e + edge
         s[COVER + k] = F(0)
         if outside or t > FARTHEST_PAINT_M:
             continue
@@ -157,8 +157,6 @@ def _shape(kind, row, glyphs, softness, s):  # type: ignore[no-untyped-def]
             x, y, blur = x / row[6], y / row[6], blur / row[6]
             s[COVER + k] = glyph_cover(glyphs.strokes, first, last, x, y, row[7], dx, dy, blur)
         else:
-            away = np.sqrt((x / row[7]) ** 2 + (y / row[6]) ** 2) + F(1e-6)
-            gx, gy = x / (row[7] * row[7] * away), y / (row[6] * row[6] * away)
-            across = gx * dx + gy * dy
-            blur *= np.sqrt(gx * gx + gy * gy + across * across) + F(1e-9)
-            s[COVER + k] = stroke(away, F(1), blur)
+            a2, b2 = row[6] * row[6], row[7] * row[7]
+            blur *= np.sqrt(F(0.5) * ((F(1) + dx * dx) / b2 + (F(1) + dy * dy) / a2))
+            s[COVER + k] = stroke(np.sqrt(x * x / b2 + y * y / a2), F(1), blur)

@@ -51,15 +51,18 @@ def dashes(x, period, blur):  # type: ignore[no-untyped-def]
 
 @jit()
 def glyph_cover(strokes, first, last, x, y, half_width, dx, dy, blur):  # type: ignore[no-untyped-def]
-    """How much of a glyph's strokes covers (x, y); (dx, dy): the ray's slant along its axes."""
+    """How much of a glyph's strokes covers (x, y); (dx, dy): the ray's slant along its axes.
+
+    A stroke is a rectangle that reaches half its width beyond its end points.
+    """
     cover = F(0)
     for i in range(first, last):
-        x0, y0 = strokes[i, 0], strokes[i, 1]
-        sx, sy = strokes[i, 2] - x0, strokes[i, 3] - y0
-        along = ((x - x0) * sx + (y - y0) * sy) / (sx * sx + sy * sy)
-        along = min(max(along, F(0)), F(1))
-        ox, oy = x - x0 - along * sx, y - y0 - along * sy
-        away = np.sqrt(ox * ox + oy * oy) + F(1e-9)
-        slant = (ox * dx + oy * dy) / away
-        cover = max(cover, stroke(away, half_width, stretched(blur, slant)))
+        sx, sy = strokes[i, 2] - strokes[i, 0], strokes[i, 3] - strokes[i, 1]
+        length = np.sqrt(sx * sx + sy * sy)
+        sx, sy = sx / length, sy / length
+        px, py = x - strokes[i, 0], y - strokes[i, 1]
+        along_blur = stretched(blur, sx * dx + sy * dy)
+        across_blur = stretched(blur, sx * dy - sy * dx)
+        along = strip(px * sx + py * sy, -half_width, length + half_width, along_blur)
+        cover = max(cover, along * strip(sx * py - sy * px, -half_width, half_width, across_blur))
     return cover
