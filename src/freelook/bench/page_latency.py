@@ -60,11 +60,11 @@ PROBE = """() => {
     pictured(times);
     log.frames.push([times.callbackMs, performance.now(), bits.join('')]);
   };
-  const draw = app.drawPanes.bind(app);
-  app.drawPanes = (q) => {
-    draw(q);
+  const drawn = app.drawn.bind(app);
+  app.drawn = (aim) => {
     gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, one);
-    log.draws.push([performance.now(), q[2]]);
+    log.draws.push([performance.now(), aim.q[2]]);
+    drawn(aim);
   };
   const tick = (ms) => { log.ticks.push(ms); requestAnimationFrame(tick); };
   requestAnimationFrame(tick);
