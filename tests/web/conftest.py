@@ -21,6 +21,7 @@ FLAGS = [
     "--disable-quic",
     "--autoplay-policy=no-user-gesture-required",
     "--force-color-profile=srgb",
+    "--disable-features=WebRtcHideLocalIpsWithMdns",  # a page that calls itself must find itself
 ]
 # Mesa's software GL draws three times as fast as Chromium's own, where it is installed.
 MESA = ["--use-angle=gl-egl", "--ignore-gpu-blocklist"]

@@ -124,6 +124,7 @@ export class App {
     const trying = state === 'connecting' && this.whepState === 'lost';
     if (!trying) [this.whepState, this.whepMessage] = [state, message];
     if (state === 'connected') this.connectedMs = performance.now();
+    if (state === 'lost') this.video.srcObject = null; // or the browser shows a black frame
     report(this, performance.now());
   }
 
