@@ -32,8 +32,8 @@ async function answer(offer) {
     window.stations.push(peer);
     peer.ondatachannel = ({channel}) => {
         peer.channel = channel;
-        peer.says = setInterval(() => channel.readyState === 'open' && channel.send(
-            JSON.stringify({type: 'pong', t: performance.now(), ns: performance.now() * 1e6})), 100);
+        const pong = () => JSON.stringify({type: 'pong', t: performance.now(), ns: 0});
+        peer.says = setInterval(() => channel.readyState === 'open' && channel.send(pong()), 100);
     };
     await peer.setRemoteDescription({type: 'offer', sdp: offer});
     peer.addTrack(camera.captureStream(30).getVideoTracks()[0]);
