@@ -22,6 +22,7 @@ import csv
 import math
 import threading
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..clock import NS_PER_S, Clock, FakeClock, now_ns
@@ -197,7 +198,7 @@ def _record(shot: Shot, out: str, fps: float, frames: int) -> None:
     """Frames as fast as they can be made; stamps are the frames' own times."""
     from ._bars import bar
 
-    with bar(out, frames, "frames", quiet=frames == 1) as advance:
+    with bar(Path(out).name, frames, "frames", quiet=frames == 1) as advance:
         for index in range(frames):
             t_ns = round(index * NS_PER_S / fps)
             shot.take(t_ns, t_ns, FakeClock(t_ns))
