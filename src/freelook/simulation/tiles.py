@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .compiled import jit
+from .compiled import jit, sources_digest
 from .ground import shade_ground
 from .pyramid import Float32s, Pyramid
 from .scene import Scene
@@ -116,7 +116,7 @@ def _find(view, cone, listed):  # type: ignore[no-untyped-def]
 
 
 @jit()
-def shade_tile(landscape, tiles, view, tile, s, listed):  # type: ignore[no-untyped-def]
+def _shade_tile(landscape, tiles, view, tile, s, listed):  # type: ignore[no-untyped-def]
     """Colours of one tile into the scratch rows RED, GREEN, BLUE; black where rays do not count."""
     m = view.world_from_rays
     lowest, highest = F(1), F(-1)
@@ -139,11 +139,11 @@ def shade_tile(landscape, tiles, view, tile, s, listed):  # type: ignore[no-unty
 
 
 @jit()
-def shade_tiles(landscape, tiles, view, first, last, out):  # type: ignore[no-untyped-def]
+def _shade_tiles(landscape, tiles, view, first, last, out):  # type: ignore[no-untyped-def]
     """Colours of the tiles first to last (excluded) into out (tiles, 256, 3)."""
     listed, s = np.empty(len(view.order), np.int32), np.empty(SCRATCH, np.float32)
     for tile in range(first, last):
-        shade_tile(landscape, tiles, view, tile, s, listed)
+        _shade_tile(landscape, tiles, view, tile, s, listed)
         for k in range(TILE):
             out[tile, k, 0], out[tile, k, 1], out[tile, k, 2] = (
                 s[RED + k],
@@ -153,14 +153,14 @@ def shade_tiles(landscape, tiles, view, first, last, out):  # type: ignore[no-un
 
 
 @jit()
-def shade_planes(landscape, tiles, view, first, last, corners, yuv, y, u, v):  # type: ignore[no-untyped-def]
+def _shade_planes(landscape, tiles, view, first, last, corners, yuv, y, u, v):  # type: ignore[no-untyped-def]
     """The same into i420 planes; tile k has its corner at pixel corners[k] = (x, y), both even.
 
     `yuv` (3, 4): code values = yuv[:, :3] @ rgb + yuv[:, 3]. Chroma is the mean of 2x2 pixels.
     """
     listed, s = np.empty(len(view.order), np.int32), np.empty(SCRATCH, np.float32)
     for tile in range(first, last):
-        shade_tile(landscape, tiles, view, tile, s, listed)
+        _shade_tile(landscape, tiles, view, tile, s, listed)
         left, top = corners[tile, 0], corners[tile, 1]
         for row in range(min(SIDE, y.shape[0] - top)):
             for column in range(min(SIDE, y.shape[1] - left)):
@@ -183,6 +183,25 @@ def shade_planes(landscape, tiles, view, first, last, corners, yuv, y, u, v):  #
 @jit(inline="always")
 def _mean_of_four(s, c, k):  # type: ignore[no-untyped-def]
     return F(0.25) * (s[c + k] + s[c + k + 1] + s[c + k + SIDE] + s[c + k + SIDE + 1])
+
+
+def _entry_points(digest: int) -> tuple[Callable[..., None], Callable[..., None]]:
+    """The two functions called from outside, the only ones that Numba keeps on disk."""
+
+    @jit(cache=True)
+    def shade_tiles(landscape, tiles, view, first, last, out):  # type: ignore[no-untyped-def]
+        digest  # noqa: B018 - enclosed
+        _shade_tiles(landscape, tiles, view, first, last, out)
+
+    @jit(cache=True)
+    def shade_planes(landscape, tiles, view, first, last, corners, yuv, y, u, v):  # type: ignore[no-untyped-def]
+        digest  # noqa: B018 - enclosed
+        _shade_planes(landscape, tiles, view, first, last, corners, yuv, y, u, v)
+
+    return shade_tiles, shade_planes
+
+
+shade_tiles, shade_planes = _entry_points(sources_digest())
 
 
 def in_threads(work: Callable[[int, int], None], tiles: int, threads: int) -> None:
