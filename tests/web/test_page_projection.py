@@ -35,7 +35,7 @@ CAMERAS = {
     "equidistant": make_camera(SIZE, Equidistant(f=140.0), field_deg=188),
     "equisolid": make_camera(SIZE, Equisolid(f=150.0), field_deg=200),
     "orthographic": make_camera(SIZE, Orthographic(f=230.0), field_deg=170),
-    "polynomial": make_camera(SIZE, Polynomial(a=150.0, b=4.0, c=-6.0), field_deg=188),
+    "polynomial": make_camera(SIZE, Polynomial(a=150.0, b=2.0, c=-6.0), field_deg=188),
     "kannala_brandt": make_camera(
         SIZE, KannalaBrandt(f=140.0, k1=-0.01, k2=0.004, k3=-0.001), field_deg=210
     ),

@@ -42,7 +42,9 @@ export class App {
     this.screen = new Screen(byId('stage'), this.renderer, this.settings, this.zoom);
     document.documentElement.classList.toggle('software', this.renderer.software);
 
-    this.link = new Link(this.wake, (rtp) => this.latency.frameTold(rtp));
+    // Before there is a picture, poses are not worth the work of drawing.
+    this.link = new Link(() => this.pictureMs !== null && this.wake(),
+      (rtp) => this.latency.frameTold(rtp));
     this.latency = new Latency(this.link);
     const patience = () => ({ holdS: station.hold_s, easeS: station.ease_s });
     this.hand = new HandHead();
