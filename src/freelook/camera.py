@@ -4,11 +4,12 @@ Every renderer in every language does the same few operations with one table:
 
     p = d.xy / (|d| + d.z)             stereographic coordinate, |p| = tan(theta/2)
     t = p . p                          = tan^2(theta/2)
-    pixel = center + stretch @ (p * g(t))       g(t) = r(theta) / tan(theta/2)
+    pixel = center + stretch @ (p * g)          g = r(theta) / tan(theta/2)
 
 `d` is a ray in the camera frame, of any length, at any angle from the axis but exactly 180
-degrees. g is tabulated at 256 equally spaced t on [0, t_max] and interpolated linearly. A ray
-with t > t_max is not seen by the lens.
+degrees. g is tabulated at 256 equally spaced |p| = sqrt(t) on [0, sqrt(t_max)] and interpolated
+linearly: in |p| every lens is smooth, those with even powers of theta among them. A ray with
+t > t_max is not seen by the lens.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ NARROWEST_RAD = np.radians(0.5)
 
 @dataclass(frozen=True)
 class RadialTable:
-    """g(t), ready for a renderer: `g` float32 (256,), `t_max`, and what the table costs.
+    """g, ready for a renderer: `g` float32 (256,), `t_max`, and what the table costs.
 
     `residual_px` is the largest distance between table and exact formula over the whole field,
     measured at the middle of every interval, where linear interpolation is worst.
@@ -45,26 +46,25 @@ class RadialTable:
 
     def __call__(self, t: Floats) -> Floats:
         """g at `t`, linear between entries; held constant beyond `t_max`."""
-        return np.interp(t, np.linspace(0.0, self.t_max, len(self.g)), self.g)
+        places = np.linspace(0.0, np.sqrt(self.t_max), len(self.g))
+        return np.interp(np.sqrt(t), places, self.g)
 
 
 def make_table(lens: Lens, theta_max: float) -> RadialTable:
     """Tabulate a lens on [0, theta_max] (radians)."""
-    t_max = float(np.tan(theta_max / 2) ** 2)
-    t = np.linspace(0.0, t_max, TABLE_SIZE)
-    g = _exact_g(lens, t, theta_max).astype(np.float32)
-    between = (t[1:] + t[:-1]) / 2
+    tangent = np.linspace(0.0, np.tan(theta_max / 2), TABLE_SIZE)
+    g = _exact_g(lens, tangent, theta_max).astype(np.float32)
+    between = (tangent[1:] + tangent[:-1]) / 2
     table_g = (g[1:].astype(np.float64) + g[:-1]) / 2
-    residual = np.abs(table_g - _exact_g(lens, between, theta_max)) * np.sqrt(between)
-    return RadialTable(g, t_max, float(residual.max()))
+    residual = np.abs(table_g - _exact_g(lens, between, theta_max)) * between
+    return RadialTable(g, float(tangent[-1] ** 2), float(residual.max()))
 
 
-def _exact_g(lens: Lens, t: Floats, theta_max: float) -> Floats:
-    tangent = np.sqrt(t)
+def _exact_g(lens: Lens, tangent: Floats, theta_max: float) -> Floats:
     theta = np.minimum(2 * np.arctan(tangent), theta_max)
     on_axis = 2 * radius_slope(lens, np.zeros(1))[0]  # r / tan(theta/2) -> 2 r'(0)
     return np.divide(
-        lens.radius(theta), tangent, out=np.full_like(t, on_axis), where=tangent > 1e-9
+        lens.radius(theta), tangent, out=np.full_like(tangent, on_axis), where=tangent > 1e-9
     )
 
 

@@ -93,7 +93,7 @@ def project_nodes(
             if t > far:
                 shrink = np.sqrt(far / t)
                 px, py, t = px * shrink, py * shrink, far
-            gain = look_up(g, t / t_max * last)
+            gain = look_up(g, np.sqrt(t / t_max) * last)
             px, py = px * gain, py * gain
             nodes[0, row, column] = center[0] + stretch[0, 0] * px + stretch[0, 1] * py
             nodes[1, row, column] = center[1] + stretch[1, 0] * px + stretch[1, 1] * py
