@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from freelook.simulation.flight import GRAVITY_M_S2, FigureEight, Hover
+from freelook.simulation.scene import airfield
 
 TIMES_NS = np.arange(0, 72, 0.9) * 1e9
 STEP_NS = 1_000_000
@@ -65,3 +66,11 @@ def test_hovering() -> None:
     state = Hover((1.0, 2.0, -3.0), azimuth_deg=90).at(123)
     assert state.position.tolist() == [1, 2, -3]
     assert state.world_from_body.apply([1.0, 0, 0]) == pytest.approx([0, 1, 0])
+
+
+def test_it_flies_into_nothing() -> None:
+    scene = airfield()
+    things = scene.rows[scene.flat :, :4].astype(float)
+    for t_ns in TIMES_NS:
+        away = np.linalg.norm(things[:, :3] - FigureEight().at(int(t_ns)).position, axis=1)
+        assert (away > things[:, 3] + 10).all()

@@ -40,21 +40,24 @@ FARTHEST_PAINT_M = F(5000.0)
 @jit()
 def shade_ground(landscape, position, softness, s):  # type: ignore[no-untyped-def]
     """Colours of all rays, right for those that go down."""
-    low_n, high_n, low_e, high_e = _places(position, softness, landscape.ground.per_m, s)
+    low_n, high_n, low_e, high_e, edge = _places(position, softness, landscape.ground.per_m, s)
     _textures(landscape.ground, landscape.detail, s)
     scene = landscape.scene
     for index in range(scene.flat):
-        if scene.rows[index, 0] > high_n or scene.rows[index, 1] < low_n:
+        kind = scene.kinds[index]
+        straight = kind in (RECT, SHADOW)
+        reach = F(0) if straight else edge
+        if scene.rows[index, 0] - reach > high_n or scene.rows[index, 1] + reach < low_n:
             continue
-        if scene.rows[index, 2] > high_e or scene.rows[index, 3] < low_e:
+        if scene.rows[index, 2] - reach > high_e or scene.rows[index, 3] + reach < low_e:
             continue
         row = scene.rows[index]
-        kind = scene.kinds[index]
-        if kind in (RECT, SHADOW):
-            _rectangle(row[4], row[5], row[6], row[7], s)
+        if not straight:
+            _shape(kind, row, scene.glyphs, softness, s)
+        elif _rectangle(row[4], row[5], row[6], row[7], s) > 0:
             _refine(kind, row, softness, s)
         else:
-            _shape(kind, row, scene.glyphs, softness, s)
+            continue
         if kind in (SHADOW, DISC):
             for k in range(TILE):
                 s[LIGHT + k] = min(s[LIGHT + k], F(1) - (F(1) - SHADE) * s[COVER + k])
@@ -70,8 +73,7 @@ def shade_ground(landscape, position, softness, s):  # type: ignore[no-untyped-d
 
 @jit()
 def _places(p, softness, per_m, s):  # type: ignore[no-untyped-def]
-    """Where the rays meet the ground and how blurred; returns the bounds of all that matters."""
-    low_n, high_n, low_e, high_e = F(1e9), F(-1e9), F(1e9), F(-1e9)
+    """Where the rays meet the ground; returns the bounds there, and how far round edges reach."""
     pn, pe, height = p[0], p[1], -p[2]
     for k in range(TILE):
         down = max(s[DD + k], LOWEST)
@@ -80,19 +82,16 @@ def _places(p, softness, per_m, s):  # type: ignore[no-untyped-def]
         blur = softness * t
         bn, be = stretched(blur, s[DN + k] / down), stretched(blur, s[DE + k] / down)
         s[T + k], s[NORTH + k], s[EAST + k], s[BLUR_N + k], s[BLUR_E + k] = t, n, e, bn, be
-        bn = be = EDGES * (bn + be)
         s[LEVEL + k] = log2(blur * per_m / (down * np.sqrt(np.sqrt(down))))
         s[LIGHT + k] = F(1)
-        near = t < FARTHEST_PAINT_M
-        low_n, high_n = (
-            min(low_n, n - bn if near else F(1e9)),
-            max(high_n, n + bn if near else F(-1e9)),
-        )
-        low_e, high_e = (
-            min(low_e, e - be if near else F(1e9)),
-            max(high_e, e + be if near else F(-1e9)),
-        )
-    return low_n, high_n, low_e, high_e
+    low_n, high_n, low_e, high_e, edge = F(1e9), F(-1e9), F(1e9), F(-1e9), F(0)
+    for k in range(TILE):  # apart, because the compiler makes no vector code of minima
+        if s[T + k] < FARTHEST_PAINT_M:
+            n, e, bn, be = s[NORTH + k], s[EAST + k], s[BLUR_N + k], s[BLUR_E + k]
+            low_n, high_n = min(low_n, n - bn), max(high_n, n + bn)
+            low_e, high_e = min(low_e, e - be), max(high_e, e + be)
+            edge = max(edge, EDGES * (bn + be))
+    return low_n, high_n, low_e, high_e, edge
 
 
 @jit()
@@ -110,11 +109,15 @@ def _textures(ground, detail, s):  # type: ignore[no-untyped-def]
 
 @jit()
 def _rectangle(n0, n1, e0, e1, s):  # type: ignore[no-untyped-def]
-    """How much of each ray's spot lies between these bounds, into s[COVER]."""
+    """How much of each ray's spot lies between these bounds, into s[COVER]; returns the sum."""
+    total = F(0)
     for k in range(TILE):
         cover = strip(s[NORTH + k], n0, n1, s[BLUR_N + k])
         cover *= strip(s[EAST + k], e0, e1, s[BLUR_E + k])
-        s[COVER + k] = cover if s[T + k] < FARTHEST_PAINT_M else F(0)
+        cover = cover if s[T + k] < FARTHEST_PAINT_M else F(0)
+        s[COVER + k] = cover
+        total += cover
+    return total
 
 
 @jit()

@@ -208,7 +208,7 @@ def _landmarks() -> Iterator[tuple[int, Row]]:
     balloons = (
         (330.0, 130.0, 115.0, RED, WHITE),
         (40.0, 420.0, 140.0, BLUE, YELLOW),
-        (-300.0, -60.0, 105.0, YELLOW, (0.85, 0.35, 0.1)),
+        (-260.0, 190.0, 105.0, YELLOW, (0.85, 0.35, 0.1)),
         (130.0, -250.0, 120.0, GREEN, WHITE),
     )
     for north, east, height, color, other in balloons:

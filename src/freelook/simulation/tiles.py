@@ -166,7 +166,7 @@ def _shade_planes(landscape, tiles, view, first, last, corners, yuv, y, u, v):  
             for column in range(min(SIDE, y.shape[1] - left)):
                 k = row * SIDE + column
                 luma = yuv[0, 0] * s[RED + k] + yuv[0, 1] * s[GREEN + k] + yuv[0, 2] * s[BLUE + k]
-                y[top + row, left + column] = np.uint8(luma + yuv[0, 3] + F(0.5))
+                y[top + row, left + column] = np.uint8(np.int32(luma + yuv[0, 3] + F(0.5)))
         left, top = left // 2, top // 2
         for row in range(min(SIDE // 2, u.shape[0] - top)):
             for column in range(min(SIDE // 2, u.shape[1] - left)):
@@ -176,8 +176,8 @@ def _shade_planes(landscape, tiles, view, first, last, corners, yuv, y, u, v):  
                 blue = _mean_of_four(s, BLUE, k)
                 cb = yuv[1, 0] * red + yuv[1, 1] * green + yuv[1, 2] * blue + yuv[1, 3]
                 cr = yuv[2, 0] * red + yuv[2, 1] * green + yuv[2, 2] * blue + yuv[2, 3]
-                u[top + row, left + column] = np.uint8(cb + F(0.5))
-                v[top + row, left + column] = np.uint8(cr + F(0.5))
+                u[top + row, left + column] = np.uint8(np.int32(cb + F(0.5)))
+                v[top + row, left + column] = np.uint8(np.int32(cr + F(0.5)))
 
 
 @jit(inline="always")
