@@ -62,7 +62,7 @@ class View(NamedTuple):
 
 
 def make_tiles(rays: Floats, valid: NDArray[np.bool_]) -> RayTiles:
-    """Tiles of unit rays (tiles, 256, 3); a tile without a valid ray costs nothing later."""
+    """Tiles of unit rays (tiles, 256, 3); only the `valid` ones (tiles, 256) count."""
     weights = valid[..., None].astype(float)
     axis = (rays * weights).sum(axis=1)
     length = np.linalg.norm(axis, axis=1, keepdims=True)
