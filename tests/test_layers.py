@@ -14,7 +14,7 @@ PACKAGE = Path(freelook.__file__).parent
 LAYERS: list[set[str]] = [
     {"types", "errors", "clock"},
     {"lens", "camera", "viewport", "rotations", "mailbox", "axes", "pose_script"}
-    | {"color", "datagrams", "latency"},
+    | {"color", "datagrams", "latency", "plugins"},
     {"renderers", "gimbal", "simulation", "media"},
     {"sources", "trackers", "sinks", "formats"},
     {"ingest", "head", "session", "offline"},

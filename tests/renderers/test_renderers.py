@@ -116,8 +116,11 @@ def test_views_equal_the_reference(camera: Camera, layout: Layout, threads: int)
 def well_inside(
     camera: Camera, camera_from_view: Rotation, viewport: Viewport
 ) -> NDArray[np.bool_]:
-    """Pixels whose neighbours are seen too: away from the feather."""
-    seen = ~np.isnan(exact_coordinates(camera, camera_from_view, viewport)[..., 0])
+    """Pixels away from the feather, and not blended with the black beyond the picture: there
+    1/32 of a pixel is worth four code values."""
+    pixels = exact_coordinates(camera, camera_from_view, viewport)
+    last = np.array(camera.size) - 1
+    seen = ((pixels >= 2) & (pixels <= last - 2)).all(axis=-1)  # false for NaN
     padded = np.pad(seen, 3, constant_values=False)
     windows = np.lib.stride_tricks.sliding_window_view(padded, (7, 7))
     return np.asarray(windows.all(axis=(2, 3)))

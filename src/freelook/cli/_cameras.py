@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Sequence
 
 from ..camera import Camera
@@ -27,4 +28,6 @@ def mounted_camera(lens: str | None, mount: Sequence[float] | None) -> Camera:
     camera = load_camera(lens)
     if mount is None:
         return camera
+    if not all(map(math.isfinite, mount)):
+        raise FreelookError(f"--mount takes three angles in degrees, not {mount}")
     return dataclasses.replace(camera, camera_from_body=body_from_view(*mount).inv())

@@ -9,8 +9,6 @@ from __future__ import annotations
 import argparse
 import asyncio
 import contextlib
-import dataclasses
-import math
 import threading
 import webbrowser
 from collections.abc import Callable, Sequence
@@ -18,14 +16,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..camera import Camera
-from ..errors import FreelookError
-from ..formats import builtin_names, load_camera
 from ..gimbal import Gimbal, GimbalSettings
 from ..head import Head
-from ..rotations import body_from_view
 from ..trackers import known_trackers, open_tracker
 from ..viewport import Viewport
 from ._arguments import three_angles
+from ._cameras import LENS_HELP, MOUNT_HELP, mounted_camera
 from ._progress import StatusLine, say
 
 if TYPE_CHECKING:  # the web libraries are slow to load, and may be missing
@@ -44,19 +40,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="SOURCE",
         help=f"a file, device or address, or KIND:ARGUMENT (kinds: {', '.join(source_kinds())})",
     )
-    parser.add_argument(
-        "--lens",
-        metavar="PROFILE",
-        help=f"lens profile: a file, or one of: {', '.join(builtin_names())}",
-    )
+    parser.add_argument("--lens", metavar="PROFILE", help=LENS_HELP)
     parser.add_argument("--loop", action="store_true", help="play a recording over and over")
-    parser.add_argument(
-        "--mount",
-        type=three_angles,
-        metavar="YAW,PITCH,ROLL",
-        help="how the camera is fixed to the vehicle, degrees right, up, right side down "
-        "(write --mount=-10,0,0 with a leading minus)",
-    )
+    parser.add_argument("--mount", type=three_angles, metavar="YAW,PITCH,ROLL", help=MOUNT_HELP)
     add_flying_arguments(parser)
 
 
@@ -162,21 +148,6 @@ def fly(
             until=until,
         )
         asyncio.run(serving)
-
-
-def mounted_camera(lens: str | None, mount: Sequence[float] | None) -> Camera:
-    """The camera of a lens profile, turned as it is mounted."""
-    if lens is None:
-        raise FreelookError(
-            "which lens does the camera have? give --lens PROFILE, a file or one of: "
-            + ", ".join(builtin_names())
-        )
-    camera = load_camera(lens)
-    if mount is None:
-        return camera
-    if not all(map(math.isfinite, mount)):
-        raise FreelookError(f"--mount takes three angles in degrees, not {mount}")
-    return dataclasses.replace(camera, camera_from_body=body_from_view(*mount).inv())
 
 
 def open_heads(

@@ -9,6 +9,8 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
+from typing import Any
 
 import cv2
 import numpy as np
@@ -25,6 +27,7 @@ BAND_PIXELS = 160_000  # measured: the least time between cache misses and calls
 
 FloatMap = NDArray[np.float32]
 _Band = Callable[[int, int, "_Scratch"], None]
+_Constants = tuple[Any, ...]
 
 
 class CpuRenderer:
@@ -38,23 +41,27 @@ class CpuRenderer:
         self._threads = threads or os.cpu_count() or 1
         self._pool = ThreadPoolExecutor(self._threads - 1) if self._threads > 1 else None
         self._scratch = [_Scratch() for _ in range(self._threads)]
+        self._made_for: tuple[Camera | None, Viewport | None] = (None, None)
+        self._constants: _Constants = ()
 
     def render(
         self, picture: Picture, camera: Camera, camera_from_view: Rotation, viewport: Viewport
     ) -> Picture:
         check_fits(picture, camera)
-        fill = _band_filler(camera, camera_from_view, viewport)
+        rotation = camera_from_view.as_matrix().astype(np.float32)
+        constants = self._constants_of(camera, viewport)
         scales = plane_scales(picture)
+        width, height = viewport.size
         view = tuple(
-            np.empty((*_shape(viewport.size, scale), *plane.shape[2:]), np.uint8)
+            np.empty((-(-height // scale), -(-width // scale), *plane.shape[2:]), np.uint8)
             for plane, scale in zip(picture.planes, scales, strict=True)
         )
         planes = list(zip(picture.planes, view, scales, black_of(picture), strict=True))
+        halves = 2 in scales
 
         def render_band(first_row: int, rows: int, scratch: _Scratch) -> None:
-            luma = scratch.maps(0, viewport.size[0], rows)
-            chroma = scratch.maps(1, *(_half(viewport.size[0], rows) if 2 in scales else (0, 0)))
-            rim = fill(first_row, luma, chroma)
+            luma, chroma = scratch.maps(width, rows, halves)
+            rim = kernels.fill_band(first_row, rotation, *constants, luma, chroma)
             for plane, out, scale, black in planes:
                 maps = luma if scale == 1 else chroma
                 band = out[first_row // scale :][: maps.shape[1]]
@@ -64,6 +71,13 @@ class CpuRenderer:
 
         self._run(render_band, _bands(viewport.size, self._threads))
         return Picture(picture.layout, view, picture.color)
+
+    def _constants_of(self, camera: Camera, viewport: Viewport) -> _Constants:
+        """Kept from view to view: usually only the direction changes."""
+        if self._made_for[0] is not camera or self._made_for[1] is not viewport:
+            self._made_for = (camera, viewport)
+            self._constants = _constants(camera, viewport)
+        return self._constants
 
     def _run(self, band: _Band, bands: list[tuple[int, int]]) -> None:
         """All bands, taken one by one by this thread and those of the pool."""
@@ -81,13 +95,14 @@ class CpuRenderer:
 
 def coordinates(camera: Camera, camera_from_view: Rotation, viewport: Viewport) -> FloatMap:
     """Where each view pixel looks, as rendered: float32 (2, height, width); NaN where unseen."""
-    fill = _band_filler(camera, camera_from_view, viewport)
+    rotation = camera_from_view.as_matrix().astype(np.float32)
+    constants = _constants(camera, viewport)
     width, height = viewport.size
     pixels = np.empty((2, height, width), np.float32)
     for first_row, rows in _bands(viewport.size, 1):
-        maps = np.zeros((3, rows, width), np.float32)
-        fill(first_row, maps, np.empty((3, 0, 0), np.float32))
-        maps[:2, maps[2] > camera.table.t_max] = np.nan
+        maps, none = _Scratch().maps(width, rows, False)
+        if kernels.fill_band(first_row, rotation, *constants, maps, none):
+            maps[:2, maps[2] > camera.table.t_max] = np.nan
         pixels[:, first_row : first_row + rows] = maps[:2]
     return pixels
 
@@ -96,60 +111,59 @@ class _Scratch:
     """One thread's buffers for coordinates, kept between bands and views: fresh memory is slow."""
 
     def __init__(self) -> None:
-        self._buffers = [np.empty(0, np.float32), np.empty(0, np.float32)]
+        self._luma = self._chroma = np.empty(0, np.float32)
 
-    def maps(self, which: int, width: int, height: int) -> FloatMap:
-        """x, y, t for a band: (3, height, width)."""
-        needed = 3 * width * height
-        if len(self._buffers[which]) < needed:
-            self._buffers[which] = np.empty(needed, np.float32)
-        return self._buffers[which][:needed].reshape(3, height, width)
+    def maps(self, width: int, rows: int, halves: bool) -> tuple[FloatMap, FloatMap]:
+        """x, y, t of a band for luma (3, rows, width), and for chroma half as large, or empty."""
+        half_width, half_rows = (-(-width // 2), -(-rows // 2)) if halves else (0, 0)
+        needed, half_needed = 3 * rows * width, 3 * half_rows * half_width
+        if len(self._luma) < needed:
+            self._luma = np.empty(needed, np.float32)
+        if len(self._chroma) < half_needed:
+            self._chroma = np.empty(half_needed, np.float32)
+        return (
+            self._luma[:needed].reshape(3, rows, width),
+            self._chroma[:half_needed].reshape(3, half_rows, half_width),
+        )
 
 
-def _band_filler(
-    camera: Camera, camera_from_view: Rotation, viewport: Viewport
-) -> Callable[[int, FloatMap, FloatMap], bool]:
-    """`kernels.fill_band` for one view: (first row, luma maps, chroma maps) -> rim in the band."""
-    constants = (
+def _constants(camera: Camera, viewport: Viewport) -> _Constants:
+    """What `kernels.fill_band` needs to know of camera and viewport."""
+    return (
         viewport.size,
         viewport.focal_px,
-        camera_from_view.as_matrix().astype(np.float32),
         camera.table.g,
         np.float32(camera.table.t_max),
         np.asarray(camera.center, dtype=np.float32),
         np.asarray(camera.stretch, dtype=np.float32),
     )
-    return lambda first_row, luma, chroma: kernels.fill_band(first_row, *constants, luma, chroma)
 
 
+@lru_cache
 def _bands(size: tuple[int, int], threads: int) -> list[tuple[int, int]]:
-    """(first row, rows) of the bands, as many for each thread; all start at an even row."""
+    """(first row, rows) of the bands; all start at an even row.
+
+    The last ones are smaller, so that no thread has to wait long for another.
+    """
     width, height = size
-    count = threads * -(-width * height // (BAND_PIXELS * threads))
-    rows = -(-height // (2 * count)) * 2
-    return [(first, min(rows, height - first)) for first in range(0, height, rows)]
+    whole = max(16, BAND_PIXELS // width // 2 * 2)
+    bands, first = [], 0
+    while first < height:
+        fair = -(-(height - first) // (3 * threads)) if threads > 1 else height
+        rows = min(whole, max(16, fair // 2 * 2), height - first)
+        bands.append((first, rows))
+        first += rows
+    return bands
 
 
 def _sample(plane: Plane, maps: FloatMap, black: int, out: Plane) -> None:
+    value = (black,) * 4
+    x, y = maps[0], maps[1]
     cv2.remap(
-        plane,
-        maps[0],
-        maps[1],
-        cv2.INTER_LINEAR,
-        dst=out,
-        borderMode=cv2.BORDER_CONSTANT,
-        borderValue=(black,) * 4,
+        plane, x, y, cv2.INTER_LINEAR, dst=out, borderMode=cv2.BORDER_CONSTANT, borderValue=value
     )
 
 
 def _feather(view: Plane, t: FloatMap, t_max: float, black: int) -> None:
     channels = view if view.ndim == 3 else view[..., None]
     kernels.feather(channels, t, t_max, np.float32(black))
-
-
-def _shape(size: tuple[int, int], scale: int) -> tuple[int, int]:
-    return -(-size[1] // scale), -(-size[0] // scale)
-
-
-def _half(width: int, height: int) -> tuple[int, int]:
-    return -(-width // 2), -(-height // 2)

@@ -20,9 +20,9 @@ RIM = np.float32(0.98)  # of t_max: below it, no pixel of the view is feathered
 @numba.njit(cache=True, nogil=True, fastmath=True)
 def fill_band(
     first_row: int,
+    camera_from_view: F32,
     size: tuple[int, int],
     focal_px: float,
-    camera_from_view: F32,
     g: F32,
     t_max: Any,
     center: F32,
@@ -50,9 +50,7 @@ def fill_band(
             break
         step //= 2
     rim = nodes[2].max() > t_max * RIM
-    expand(nodes, step, 1, 3 if rim else 2, luma)
-    if chroma.size:
-        expand(nodes, step, 2, 3 if rim else 2, chroma)
+    expand(nodes, step, 3 if rim else 2, luma, chroma)
     return bool(rim)
 
 
@@ -137,56 +135,70 @@ def interpolation_error(nodes: F32, t_max: float) -> float:
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
-def expand(nodes: F32, step: int, scale: int, values: int, maps: F32) -> None:
-    """From nodes to the middle of every pixel of a plane `scale` times smaller than luma.
+def expand(nodes: F32, step: int, values: int, luma: F32, chroma: F32) -> None:
+    """From nodes to the middle of every pixel; the first `values` of x, y and t.
 
-    The first `values` of x, y and t are filled in. Along the rows of nodes first, then down
-    between them: the long inner loops run over contiguous memory.
+    Along the rows of nodes first, then down between them: the long inner loops run over
+    contiguous memory. Chroma pixels lie in the middle of 2 x 2 luma pixels.
     """
-    per_cell = step // scale
-    cells = (maps.shape[1] - 1) // per_cell + 1
-    shift = np.float32((scale - 1) / 2 / step)
-    wide = np.empty((cells + 3, maps.shape[2]), np.float32)
+    cells = (luma.shape[1] - 1) // step + 1
+    wide = np.empty((cells + 3, luma.shape[2]), np.float32)
+    half = np.empty((cells + 3, chroma.shape[2]), np.float32)
     for k in range(values):
-        gain = np.float32(1 / scale) if k < 2 else np.float32(1)
-        offset = np.float32((1 - scale) / 2 / scale) if k < 2 else np.float32(0)
         for j in range(cells + 3):
-            widen(nodes[k, j], step, scale, gain, offset, wide[j])
-        for cell in range(cells):
-            a, b, c, d = wide[cell], wide[cell + 1], wide[cell + 2], wide[cell + 3]
-            first = cell * per_cell
-            for row in range(first, min(first + per_cell, maps.shape[1])):
-                f = np.float32(row - first) / np.float32(per_cell) + shift
-                blend(a, b, c, d, f, maps[k, row])
+            widen(nodes[k, j], step, wide[j])
+            halve(wide[j], k < 2, half[j])
+        blend_rows(wide, step, np.float32(0), luma[k])
+        blend_rows(half, step // 2, np.float32(0.5 / step), chroma[k])
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
-def blend(a: F32, b: F32, c: F32, d: F32, f: Any, out: F32) -> None:
-    """The cubic through rows a, b, c, d at -1, 0, 1, 2, evaluated at f (Lagrange)."""
-    one, two = np.float32(1), np.float32(2)
-    wa = -f * (f - one) * (f - two) / np.float32(6)
-    wb = (f + one) * (f - one) * (f - two) / two
-    wc = -(f + one) * f * (f - two) / two
-    wd = (f + one) * f * (f - one) / np.float32(6)
-    for i in range(len(out)):
-        out[i] = wa * a[i] + wb * b[i] + wc * c[i] + wd * d[i]
-
-
-@numba.njit(cache=True, nogil=True, fastmath=True)
-def widen(nodes: F32, step: int, scale: int, gain: Any, offset: Any, out: F32) -> None:
-    """Expand one row of nodes along the row: gain * cubic + offset."""
-    per_cell = step // scale
-    shift = np.float32((scale - 1) / 2 / step)
-    for cell in range((len(out) - 1) // per_cell + 1):
+def widen(nodes: F32, step: int, out: F32) -> None:
+    """Expand one row of nodes along the row, by the cubic through four of them (Lagrange)."""
+    for cell in range((len(out) - 1) // step + 1):
         a, b, c, d = nodes[cell], nodes[cell + 1], nodes[cell + 2], nodes[cell + 3]
-        c3 = ((d - a) / np.float32(6) + (b - c) / np.float32(2)) * gain
-        c2 = ((a + c) / np.float32(2) - b) * gain
-        c1 = (c - b) * gain - c2 - c3
-        c0 = b * gain + offset
-        start = cell * per_cell
-        for k in range(min(per_cell, len(out) - start)):
-            f = np.float32(k) / np.float32(per_cell) + shift
-            out[start + k] = ((c3 * f + c2) * f + c1) * f + c0
+        c3 = (d - a) / np.float32(6) + (b - c) / np.float32(2)
+        c2 = (a + c) / np.float32(2) - b
+        c1 = c - b - c2 - c3
+        start = cell * step
+        for k in range(min(step, len(out) - start)):
+            f = np.float32(k) / np.float32(step)
+            out[start + k] = ((c3 * f + c2) * f + c1) * f + b
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def halve(wide: F32, coordinates: bool, out: F32) -> None:
+    """Values between pairs of columns; coordinates become those of the plane half as large."""
+    gain, offset = np.float32(0.5), np.float32(0)
+    if coordinates:
+        gain, offset = np.float32(0.25), np.float32(-0.25)
+    pairs = len(wide) // 2 if len(out) else 0
+    for i in range(pairs):
+        out[i] = (wide[2 * i] + wide[2 * i + 1]) * gain + offset
+    if pairs < len(out):  # an odd width: half a step beyond the last column
+        last = len(wide) - 1
+        out[pairs] = (np.float32(3) * wide[last] - wide[last - 1]) * gain + offset
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def blend_rows(wide: F32, per_cell: int, shift: Any, out: F32) -> None:
+    """Rows between widened rows, by the cubic through four of them (Lagrange)."""
+    one, two, six = np.float32(1), np.float32(2), np.float32(6)
+    for row in range(out.shape[0]):
+        cell, within = divmod(row, per_cell)
+        f = np.float32(within) / np.float32(per_cell) + shift
+        wa = -f * (f - one) * (f - two) / six
+        wb = (f + one) * (f - one) * (f - two) / two
+        wc = -(f + one) * f * (f - two) / two
+        wd = (f + one) * f * (f - one) / six
+        target = out[row]
+        for i in range(out.shape[1]):
+            target[i] = (
+                wa * wide[cell, i]
+                + wb * wide[cell + 1, i]
+                + wc * wide[cell + 2, i]
+                + wd * wide[cell + 3, i]
+            )
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)

@@ -7,14 +7,13 @@ the sink. Opening checks what can be checked at once, such as a file that is the
 
 from __future__ import annotations
 
-import pkgutil
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
 from ..errors import SinkError
+from ..plugins import modules_by_kind
 from ..types import ColorSpace, Sink
 
 
@@ -44,12 +43,7 @@ class SinkSettings:
 
 def modules() -> dict[str, ModuleType]:
     """The sink modules by their KIND."""
-    found = [
-        import_module(f".{info.name}", __name__)
-        for info in pkgutil.iter_modules(__path__)
-        if not info.name.startswith("_")
-    ]
-    return {module.KIND: module for module in found}
+    return modules_by_kind(__name__)
 
 
 def open_sink(

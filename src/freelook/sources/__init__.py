@@ -8,25 +8,19 @@ checked at once and on this machine; whatever may have to be waited for happens 
 
 from __future__ import annotations
 
-import pkgutil
 from collections.abc import Iterable, Mapping
-from importlib import import_module
 from types import ModuleType
 from urllib.parse import parse_qsl, urlsplit
 
 from ..clock import Clock, now_ns
 from ..errors import SourceError
+from ..plugins import modules_by_kind
 from ..types import Source
 
 
 def modules() -> dict[str, ModuleType]:
     """The source modules by their KIND."""
-    found = [
-        import_module(f".{info.name}", __name__)
-        for info in pkgutil.iter_modules(__path__)
-        if not info.name.startswith("_")
-    ]
-    return {module.KIND: module for module in found}
+    return modules_by_kind(__name__)
 
 
 def open_source(

@@ -14,21 +14,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from importlib import import_module
-from pkgutil import iter_modules
 from types import ModuleType
 
 from .. import axes as axes_module
 from ..clock import Clock, now_ns
 from ..errors import TrackerError
+from ..plugins import modules_by_kind
 from ..types import Tracker
 
 
 def known_trackers() -> dict[str, ModuleType]:
     """KIND to module, for every tracker in this package."""
-    names = sorted(m.name for m in iter_modules(__path__) if not m.name.startswith("_"))
-    modules = [import_module(f".{name}", __name__) for name in names]
-    return {module.KIND: module for module in modules}
+    return modules_by_kind(__name__)
 
 
 def open_tracker(spec: str, *, clock: Clock = now_ns) -> Tracker:

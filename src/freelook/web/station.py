@@ -18,6 +18,7 @@ from ..clock import Clock, now_ns
 from ..gimbal import Aim
 from ..head import Head
 from ..ingest import Ingest
+from ..session import same_shape
 from . import messages
 from .feed import Feed
 from .units import Hub
@@ -203,7 +204,7 @@ def wrong_shape(profile: tuple[int, int], stream: Any) -> str | None:
     if stream is None or not stream.width or not stream.height:
         return None
     width, height = profile
-    if abs(width * stream.height - height * stream.width) <= max(width, height):
+    if same_shape(profile, (stream.width, stream.height)):
         return None
     return (
         f"the video is {stream.width} x {stream.height} pixels, but the lens profile is for "
