@@ -28,7 +28,7 @@ from .figures import Figure
 from .stamped import SIZE
 from .video_latency import WARM_UP, stamped_camera
 
-TO_BROWSER = "stamp to browser frame (callback)"
+TO_BROWSER = "stamp to frame in the page"
 TO_DRAWN = "stamp to drawn"
 POSE_TO_DRAWN = "pose datagram to first changed drawn frame"
 DISPLAY_FRAME = "display frame of the browser"
@@ -47,27 +47,28 @@ FLAGS = [
     "--ignore-gpu-blocklist",
 ]
 
-# Wraps the page's own steps: the frame callback, the end of the upload, the drawing. The stamp
-# is read from the very planes that are drawn. readPixels waits until the picture exists.
+# These wrap the page's own steps. The stamp is read from the very planes that are drawn.
+# readPixels waits until the picture exists.
 PROBE = """() => {
-  const app = freelook.app, feed = app.feed, gl = app.renderer.gl, one = new Uint8Array(4);
-  const log = window.bench = {frames: [], draws: [], ticks: []};
-  const arrived = feed.arrived.bind(feed), pictured = feed.onPicture;
-  feed.arrived = (times) => { times.callbackMs = performance.now(); arrived(times); };
+  const feed = freelook.app.feed, log = window.bench = {frames: [], draws: [], ticks: []};
+  const pictured = feed.onPicture;
   feed.onPicture = (times) => {
-    const w = feed.video.videoWidth, bits = [];
+    const w = freelook.stats().size[0], bits = [];
     for (let i = 0; i < 56; i++) bits.push(feed.buffer[8 * w + 16 * i + 8] > 124 ? 1 : 0);
     pictured(times);
-    log.frames.push([times.callbackMs, performance.now(), bits.join('')]);
+    log.frames.push([times.receivedMs, performance.now(), bits.join('')]);
   };
+  const tick = (ms) => { log.ticks.push(ms); requestAnimationFrame(tick); };
+  requestAnimationFrame(tick);
+}"""
+PROBE_POSES = """() => {
+  const app = freelook.app, gl = app.renderer.gl, one = new Uint8Array(4), log = window.bench;
   const drawn = app.drawn.bind(app);
   app.drawn = (aim) => {
     gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, one);
     log.draws.push([performance.now(), aim.q[2]]);
     drawn(aim);
   };
-  const tick = (ms) => { log.ticks.push(ms); requestAnimationFrame(tick); };
-  requestAnimationFrame(tick);
 }"""
 
 
@@ -93,9 +94,11 @@ def measure(seconds: float, browser_path: str) -> tuple[list[Figure], str]:
         station(sdp, pose_port) as url,
         page(url, browser_path) as opened,
     ):
-        steps = send_steps(pose_port, seconds)
+        opened.wait_for_timeout(seconds * 1000)  # the head at rest: the page draws each frame
+        to_browser, to_drawn = frame_figures(read_log(opened))
+        opened.evaluate(PROBE_POSES)
+        steps = send_steps(pose_port, seconds)  # the head turning: it draws at display rate
         log = read_log(opened)
-    to_browser, to_drawn = frame_figures(log)
     ticks = [b - a for a, b in zip(log.ticks, log.ticks[1:], strict=False)]
     return [
         to_browser,
@@ -183,11 +186,11 @@ def read_log(opened: Any) -> PageLog:
 
 def frame_figures(log: PageLog) -> tuple[Figure, Figure]:
     to_browser, to_drawn = Figure(TO_BROWSER), Figure(TO_DRAWN)
-    for callback_ms, drawn_ms, bits in log.frames[WARM_UP:]:
+    for received_ms, drawn_ms, bits in log.frames[WARM_UP:]:
         word = int(bits[::-1], 2)
         time_us = word & ((1 << TIME_BITS) - 1)
         if word >> TIME_BITS == check_bits(time_us):
-            to_browser.values_ms.append(log.station_ms(callback_ms) - time_us / 1000)
+            to_browser.values_ms.append(log.station_ms(received_ms) - time_us / 1000)
             to_drawn.values_ms.append(log.station_ms(drawn_ms) - time_us / 1000)
     return to_browser, to_drawn
 

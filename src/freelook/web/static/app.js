@@ -112,8 +112,7 @@ export class App {
 
   /** @param {MediaStream} stream */
   play(stream) {
-    this.video.srcObject = stream;
-    this.video.play().catch((error) => {
+    this.feed.play(stream).catch((error) => {
       if (error.name !== 'NotAllowedError') return; // a newer stream took over
       notify('Tap to start the video');
       addEventListener('pointerdown', () => this.video.play().catch(() => {}), { once: true });
@@ -126,7 +125,7 @@ export class App {
     const trying = state === 'connecting' && this.whepState === 'lost';
     if (!trying) [this.whepState, this.whepMessage] = [state, message];
     if (state === 'connected') this.connectedMs = performance.now();
-    if (state === 'lost') this.video.srcObject = null; // or the browser shows a black frame
+    if (state === 'lost') this.feed.stop();
     report(this, performance.now());
   }
 

@@ -62,13 +62,13 @@ export class Picture {
     gl.bindTexture(gl.TEXTURE_2D, this.textures[unit]);
   }
 
-  /** @param {HTMLVideoElement} video */
-  uploadVideo(video) {
+  /** @param {HTMLVideoElement | VideoFrame} frame @param {number} width @param {number} height */
+  uploadFrame(frame, width, height) {
     const { gl } = this;
-    this.prepare(0, gl.RGBA8, video.videoWidth, video.videoHeight);
-    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, gl.RGBA, gl.UNSIGNED_BYTE, video);
+    this.prepare(0, gl.RGBA8, width, height);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, gl.RGBA, gl.UNSIGNED_BYTE, frame);
     this.layout = 'RGB';
-    this.changed(video.videoWidth, video.videoHeight);
+    this.changed(width, height);
   }
 
   /** @param {number} width @param {number} height */

@@ -1,4 +1,7 @@
-// From the <video> to the picture's textures: the newest frame only.
+// From the stream to the picture's textures: the newest frame only.
+//
+// Where the browser hands out decoded frames (MediaStreamTrackProcessor) they are taken as soon as
+// they are decoded; elsewhere from a <video>, which shows them a display frame or two later.
 //
 // "planes" copies the decoder's Y, U, V (exact, and cheap where software draws); "rgb" lets the
 // browser convert (cheap on a GPU). A browser that cannot do the first falls back to the second
@@ -7,10 +10,7 @@
 import { colorSpace } from './colour.js';
 
 /** @typedef {{receivedMs: number | null, rtp: number | null}} FrameTimes
- * when its last packet came, page time; RTP time stamp as sent */
-
-/** @type {Record<string, number[]>} of each plane, for the pixel formats our shader reads */
-const CHANNELS = { I420: [1, 1, 1], NV12: [1, 2] };
+ * when it came to this page, page time; RTP time stamp as sent */
 
 export class VideoFeed {
   /**
@@ -23,27 +23,78 @@ export class VideoFeed {
     this.picture = picture;
     this.path = typeof VideoFrame === 'undefined' ? 'rgb' : path;
     this.onPicture = onPicture;
-    /** frames the browser decoded and showed us; those it skipped are its own */
+    /** frames the browser decoded and gave us; those it skipped are its own */
     this.presented = 0;
-    this.skipped = 0;
     this.errors = 0;
-    this.copying = false;
-    /** @type {FrameTimes | null} came while copying */
-    this.waiting = null;
     this.buffer = new Uint8Array(0);
+    /** @type {ReadableStreamDefaultReader<VideoFrame> | null} */
+    this.reader = null;
+    /** one upload at a time; frames from the <video> meanwhile wait, the newest only */
+    this.copying = false;
+    /** @type {FrameTimes | null} */
+    this.waiting = null;
     this.lastMediaTime = -1;
-    this.next();
+    if (!canReadFrames()) this.watch();
   }
 
-  next() {
+  /** Show this stream from now on. Rejects like HTMLMediaElement.play.
+   * @param {MediaStream} stream */
+  async play(stream) {
+    const [track] = stream.getVideoTracks();
+    if (track && canReadFrames()) {
+      this.read(track);
+    } else {
+      this.video.srcObject = stream;
+      await this.video.play();
+    }
+  }
+
+  /** The last picture stays. */
+  stop() {
+    this.reader?.cancel().catch(() => {});
+    this.reader = null;
+    this.video.srcObject = null; // or the browser shows a black frame
+  }
+
+  /** @param {MediaStreamTrack} track */
+  async read(track) {
+    this.stop();
+    // @ts-ignore: not in TypeScript's library
+    const reader = new MediaStreamTrackProcessor({ track, maxBufferSize: 1 }).readable.getReader();
+    this.reader = reader;
+    while (reader === this.reader) {
+      /** @type {{value?: VideoFrame, done: boolean}} */
+      const { value: frame, done } = await reader.read().catch(() => ({ done: true }));
+      if (done || !frame) return;
+      try {
+        if (reader === this.reader) await this.take(frame);
+      } finally {
+        frame.close();
+      }
+    }
+  }
+
+  /** @param {VideoFrame} frame */
+  async take(frame) {
+    this.presented += 1;
+    // @ts-ignore: not in TypeScript's library
+    const rtp = frame.metadata?.().rtpTimestamp ?? null;
+    const times = { receivedMs: performance.now(), rtp };
+    if (this.path === 'planes') await this.orElseRgb(() => this.copyPlanes(frame));
+    if (this.path === 'rgb') {
+      this.picture.uploadFrame(frame, frame.displayWidth, frame.displayHeight);
+    }
+    this.onPicture(times);
+  }
+
+  /** Wait for the <video>'s next frame. */
+  watch() {
     if (this.video.requestVideoFrameCallback) {
       this.video.requestVideoFrameCallback((_, metadata) => {
         this.presented = Math.max(this.presented + 1, metadata.presentedFrames);
-        this.arrived({
-          receivedMs: metadata.receiveTime ?? null,
-          rtp: metadata.rtpTimestamp ?? null,
-        });
-        this.next();
+        const { receiveTime, rtpTimestamp } = metadata;
+        this.arrived({ receivedMs: receiveTime ?? null, rtp: rtpTimestamp ?? null });
+        this.watch();
       });
     } else {
       requestAnimationFrame(() => this.poll());
@@ -57,18 +108,17 @@ export class VideoFeed {
       this.presented += 1;
       this.arrived({ receivedMs: null, rtp: null });
     }
-    this.next();
+    this.watch();
   }
 
   /** @param {FrameTimes} times */
   arrived(times) {
     if (!this.video.videoWidth) return;
     if (this.path === 'planes') {
-      if (this.waiting) this.skipped += 1;
       this.waiting = times;
       if (!this.copying) this.copyNewest();
     } else {
-      this.picture.uploadVideo(this.video);
+      this.picture.uploadFrame(this.video, this.video.videoWidth, this.video.videoHeight);
       this.onPicture(times);
     }
   }
@@ -78,35 +128,40 @@ export class VideoFeed {
     while (this.waiting) {
       const times = this.waiting;
       this.waiting = null;
-      try {
-        await this.copyPlanes();
-        this.onPicture(times);
-      } catch (error) {
-        this.errors += 1;
-        this.path = 'rgb';
-        console.warn('planes cannot be copied, the browser converts instead:', error);
-      }
+      const frame = new VideoFrame(this.video);
+      await this.orElseRgb(() => this.copyPlanes(frame));
+      frame.close();
+      if (this.path === 'planes') this.onPicture(times);
     }
     this.copying = false;
   }
 
-  async copyPlanes() {
-    const frame = new VideoFrame(this.video);
+  /** @param {() => Promise<void>} copy */
+  async orElseRgb(copy) {
     try {
-      const channels = CHANNELS[frame.format ?? ''];
-      if (!channels) throw new Error(`pixel format ${frame.format}`);
-      const rect = frame.visibleRect ?? new DOMRectReadOnly(0, 0, frame.codedWidth, frame.codedHeight);
-      const color = colorSpace(frame.colorSpace, rect.height);
-      if (this.buffer.length < frame.allocationSize()) {
-        this.buffer = new Uint8Array(frame.allocationSize());
-      }
-      const layout = await frame.copyTo(this.buffer);
-      this.picture.uploadPlanes(planesOf(this.buffer, layout, channels, rect), color);
-    } finally {
-      frame.close();
+      await copy();
+    } catch (error) {
+      this.errors += 1;
+      this.path = 'rgb';
+      console.warn('planes cannot be copied, the browser converts instead:', error);
     }
   }
+
+  /** @param {VideoFrame} frame */
+  async copyPlanes(frame) {
+    const channels = { I420: [1, 1, 1], NV12: [1, 2] }[frame.format ?? ''];
+    if (!channels) throw new Error(`pixel format ${frame.format}`);
+    const rect = frame.visibleRect ?? new DOMRectReadOnly(0, 0, frame.codedWidth, frame.codedHeight);
+    const color = colorSpace(frame.colorSpace, rect.height);
+    if (this.buffer.length < frame.allocationSize()) {
+      this.buffer = new Uint8Array(frame.allocationSize());
+    }
+    const layout = await frame.copyTo(this.buffer);
+    this.picture.uploadPlanes(planesOf(this.buffer, layout, channels, rect), color);
+  }
 }
+
+const canReadFrames = () => 'MediaStreamTrackProcessor' in window && 'VideoFrame' in window;
 
 /** @param {Uint8Array} buffer @param {{offset: number, stride: number}[]} layout
  * @param {number[]} channels @param {{width: number, height: number}} rect
