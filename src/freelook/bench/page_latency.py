@@ -31,6 +31,7 @@ from .video_latency import WARM_UP, stamped_camera
 TO_BROWSER = "stamp to frame in the page"
 TO_DRAWN = "stamp to drawn"
 POSE_TO_DRAWN = "pose datagram to first changed drawn frame"
+GPU_TIME = "GPU (or its stand-in) time for one view"
 DISPLAY_FRAME = "display frame of the browser"
 POSE_HZ = 250
 STEP_DEG = 8.0
@@ -47,8 +48,9 @@ FLAGS = [
     "--ignore-gpu-blocklist",
 ]
 
-# These wrap the page's own steps. The stamp is read from the very planes that are drawn.
-# readPixels waits until the picture exists.
+# These wrap the page's own steps. The stamp is read from the very planes that are drawn. "Drawn"
+# is when the page has issued a view; what the GPU takes for it is measured by itself: waiting for
+# each view (readPixels) would stop the page from doing anything else meanwhile.
 PROBE = """() => {
   const feed = freelook.app.feed, log = window.bench = {frames: [], draws: [], ticks: []};
   const pictured = feed.onPicture;
@@ -62,13 +64,25 @@ PROBE = """() => {
   requestAnimationFrame(tick);
 }"""
 PROBE_POSES = """() => {
-  const app = freelook.app, gl = app.renderer.gl, one = new Uint8Array(4), log = window.bench;
+  const app = freelook.app, log = window.bench;
+  log.ticks = [];
   const drawn = app.drawn.bind(app);
   app.drawn = (aim) => {
-    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, one);
     log.draws.push([performance.now(), aim.q[2]]);
     drawn(aim);
   };
+}"""
+PROBE_GPU = """() => {
+  const { screen, renderer: { gl } } = freelook.app, one = new Uint8Array(4), times = [];
+  const finish = () => gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, one);
+  for (let i = 0; i < 40; i++) {
+    finish();
+    const start = performance.now();
+    screen.drawPanes([Math.cos(i / 200), 0, Math.sin(i / 200), 0]);
+    finish();
+    times.push(performance.now() - start);
+  }
+  return times;
 }"""
 
 
@@ -87,7 +101,7 @@ class PageLog:
 
 
 def measure(seconds: float, browser_path: str) -> tuple[list[Figure], str]:
-    """The four figures, and the name of what drew them."""
+    """The figures, and the name of what drew them."""
     pose_port = free_port()
     with (
         stamped_camera(seconds * 2 + 60) as (_, sdp),
@@ -96,14 +110,16 @@ def measure(seconds: float, browser_path: str) -> tuple[list[Figure], str]:
     ):
         opened.wait_for_timeout(seconds * 1000)  # the head at rest: the page draws each frame
         to_browser, to_drawn = frame_figures(read_log(opened))
-        opened.evaluate(PROBE_POSES)
+        opened.evaluate(PROBE_POSES)  # starts the display frames anew
         steps = send_steps(pose_port, seconds)  # the head turning: it draws at display rate
         log = read_log(opened)
+        gpu = Figure(GPU_TIME, opened.evaluate(PROBE_GPU))
     ticks = [b - a for a, b in zip(log.ticks, log.ticks[1:], strict=False)]
     return [
         to_browser,
         to_drawn,
         Figure(POSE_TO_DRAWN, pose_latencies(steps, log)),
+        gpu,
         Figure(DISPLAY_FRAME, ticks[WARM_UP:]),
     ], log.renderer
 

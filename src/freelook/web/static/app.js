@@ -43,7 +43,7 @@ export class App {
     document.documentElement.classList.toggle('software', this.renderer.software);
 
     // Before there is a picture, poses are not worth the work of drawing.
-    this.link = new Link(() => this.pictureMs !== null && this.wake(),
+    this.link = new Link(() => this.pictureMs !== null && this.posed(),
       (rtp) => this.latency.frameTold(rtp));
     this.latency = new Latency(this.link);
     const patience = () => ({ holdS: station.hold_s, easeS: station.ease_s });
@@ -138,6 +138,13 @@ export class App {
     else this.wake();
   }
 
+  /** A new pose from the station. The first after a rest is drawn at once: nothing else is
+   * under way. While the head moves, each display frame takes the newest. */
+  posed() {
+    if (this.screen.moving(performance.now())) this.wake();
+    else this.drawNow();
+  }
+
   /** Draw at the next display frame. */
   wake() {
     this.scheduled ||= requestAnimationFrame(() => this.drawNow());
@@ -152,7 +159,7 @@ export class App {
     const aim = this.command.aim(nowMs);
     const stale = this.pictureMs !== null && nowMs - this.pictureMs > STALE_S * 1000;
     this.renderer.grey = stale ? 1 : 0;
-    if (this.screen.draw(aim.q)) this.drawn(aim);
+    if (this.screen.draw(aim.q, nowMs)) this.drawn(aim);
     if (this.keyboard.active || this.gamepads.active || aim.state === 'easing') this.wake();
   }
 

@@ -10,8 +10,10 @@ import { spanning } from './viewport.js';
 /** @typedef {import('./viewport.js').Viewport} Viewport */
 /** @typedef {import('./renderer.js').Rect} Rect */
 
-const SOFTWARE_PIXELS = 960 * 540;
+// Where software draws: what two cores can draw 60 times a second, beside decoding the video.
+const SOFTWARE_PIXELS = 640 * 360;
 const GPU_PIXELS = 3840 * 2160;
+const MOVING_MS = 50; // the head counts as moving for so long after its last change
 const MOST_RATIO = 2;
 
 export class Screen {
@@ -29,6 +31,13 @@ export class Screen {
     const asked = Number(new URLSearchParams(location.search).get('pixels'));
     this.mostPixels = asked || (renderer.software ? SOFTWARE_PIXELS : GPU_PIXELS);
     this.drawnKey = '';
+    this.drawnHead = '';
+    this.movedMs = -Infinity;
+  }
+
+  /** Whether the head turned a moment ago. @param {number} nowMs */
+  moving(nowMs) {
+    return nowMs - this.movedMs < MOVING_MS;
   }
 
   panes() {
@@ -43,8 +52,12 @@ export class Screen {
     return spanning(width, height, this.zoom.fieldDeg);
   }
 
-  /** Draws unless the same is there already; returns whether it did. @param {Quaternion} q */
-  draw(q) {
+  /** Draws unless the same is there already; returns whether it did.
+   * @param {Quaternion} q @param {number} nowMs */
+  draw(q, nowMs) {
+    const head = q.join();
+    if (head !== this.drawnHead) this.movedMs = nowMs;
+    this.drawnHead = head;
     this.fitCanvas();
     const { renderer, zoom, settings: { values }, stage } = this;
     const key = [q, zoom.fieldDeg, renderer.picture.version, renderer.grey, values.pip,
