@@ -1,8 +1,8 @@
 """What a moving view costs, beside OpenCV's and ffmpeg's ways and the pure resampling cost.
 
-Every round renders one pose in each way, in changing order. The picture is read once before each,
-as a decoder has just written it when a live view is rendered. ffmpeg is a process of its own: its
-time is the difference between runs with and without the filter, per frame.
+The ways take turns of `TURN` views each, as they would run in a program of their own, with a new
+pose for every view; the order changes from turn to turn. ffmpeg is a process of its own: its time
+is the difference between runs with and without the filter, per frame.
 """
 
 from __future__ import annotations
@@ -27,6 +27,9 @@ from ..types import Picture, Plane
 from ..viewport import Viewport
 
 FIELD_DEG = 188.0
+TURN = 15
+
+Way = Callable[[Rotation], None]
 
 
 @dataclass(frozen=True)
@@ -75,26 +78,29 @@ OURS, FLOOR, OPENCV, FFMPEG = (
 
 
 def run(case: Case, rounds: int, threads: int, on_round: Callable[[], None]) -> list[Timing]:
-    """Time every way for `rounds` poses on `threads` cores; ours first."""
+    """Time every way for about `rounds` poses on `threads` cores; ours first."""
     cv2.setNumThreads(threads)
     scene = make_scene(case)
-    renderer = CpuRenderer(threads)
-    ours, floor, opencv = Timing(OURS), Timing(FLOOR), Timing(OPENCV)
-    for index, rotation in enumerate(poses(rounds + 3)):
-        ways = [
-            (ours, scene.i420.planes, _ours(renderer, scene, rotation)),
-            (floor, scene.i420.planes, _floor(scene, rotation)),
-            (opencv, (scene.bgr,), _opencv(scene, rotation)),
-        ]
-        for way in range(len(ways)):
-            timing, planes, work = ways[(way + index) % len(ways)]
-            _touch(planes)
-            start = time.perf_counter()
-            work()
-            if index >= 3:  # the first rounds compile and warm up
-                timing.times_ms.append((time.perf_counter() - start) * 1e3)
+    ways: list[tuple[Timing, Way]] = [
+        (Timing(OURS), _ours(scene, threads)),
+        (Timing(FLOOR), _floor(scene)),
+        (Timing(OPENCV), _opencv(scene)),
+    ]
+    for turn in range(turns(rounds) + 1):
+        for number in range(len(ways)):
+            timing, work = ways[(number + turn) % len(ways)]
+            for rotation in poses(turn * TURN, TURN):
+                start = time.perf_counter()
+                work(rotation)
+                if turn:  # the first turn compiles and warms up
+                    timing.times_ms.append((time.perf_counter() - start) * 1e3)
         on_round()
-    return [ours, floor, opencv, ffmpeg_v360(case, threads)]
+    return [*(timing for timing, _ in ways), ffmpeg_v360(case, threads)]
+
+
+def turns(rounds: int) -> int:
+    """How many turns make about so many views."""
+    return max(1, round(rounds / TURN))
 
 
 def make_scene(case: Case) -> Scene:
@@ -115,30 +121,27 @@ def make_scene(case: Case) -> Scene:
     return Scene(camera, Viewport(case.view_size, 90.0), i420, bgr)
 
 
-def poses(count: int) -> Iterator[Rotation]:
+def poses(first: int, count: int) -> Iterator[Rotation]:
     """camera_from_view of a head that looks around smoothly, new in every frame."""
-    for i in range(count):
+    for i in range(first, first + count):
         yield RDF_FROM_FRD * body_from_view(20 * np.sin(i / 15), 10 * np.cos(i / 15), 0.0)
 
 
-def _touch(planes: tuple[Plane, ...]) -> None:
-    for plane in planes:
-        plane.max()
+def _ours(scene: Scene, threads: int) -> Way:
+    renderer = CpuRenderer(threads)
 
-
-def _ours(renderer: CpuRenderer, scene: Scene, camera_from_view: Rotation) -> Callable[[], None]:
-    def work() -> None:
+    def work(camera_from_view: Rotation) -> None:
         renderer.render(scene.i420, scene.camera, camera_from_view, scene.viewport)
 
     return work
 
 
-def _floor(scene: Scene, camera_from_view: Rotation) -> Callable[[], None]:
-    """Nothing but sampling: the maps of this very pose lie ready, fresh in the cache."""
-    luma = coordinates(scene.camera, camera_from_view, scene.viewport)
+def _floor(scene: Scene) -> Way:
+    """Nothing but sampling: a map that never changes lies ready."""
+    luma = coordinates(scene.camera, next(poses(0, 1)), scene.viewport)
     chroma = np.ascontiguousarray(luma[:, ::2, ::2] / 2)
 
-    def work() -> None:
+    def work(_camera_from_view: Rotation) -> None:
         for index, plane in enumerate(scene.i420.planes):
             maps = chroma if index else luma
             cv2.remap(plane, maps[0], maps[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
@@ -146,16 +149,16 @@ def _floor(scene: Scene, camera_from_view: Rotation) -> Callable[[], None]:
     return work
 
 
-def _opencv(scene: Scene, camera_from_view: Rotation) -> Callable[[], None]:
+def _opencv(scene: Scene) -> Way:
     """The documented way: initUndistortRectifyMap for the pose, then remap the BGR picture."""
     width, height = scene.viewport.size
     f = getattr(scene.camera.lens, "f")  # noqa: B009 - the bench's lens has one
     (cx, cy), focal = scene.camera.center, scene.viewport.focal_px
     k = np.array([[f, 0, cx], [0, f, cy], [0, 0, 1.0]])
     p = np.array([[focal, 0, (width - 1) / 2], [0, focal, (height - 1) / 2], [0, 0, 1.0]])
-    view_from_camera = camera_from_view.inv().as_matrix()
 
-    def work() -> None:
+    def work(camera_from_view: Rotation) -> None:
+        view_from_camera = camera_from_view.inv().as_matrix()
         x, y = cv2.fisheye.initUndistortRectifyMap(
             k, np.zeros(4), view_from_camera, p, (width, height), cv2.CV_16SC2
         )

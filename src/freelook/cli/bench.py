@@ -43,12 +43,12 @@ def run(args: argparse.Namespace) -> int:
 def _render(args: argparse.Namespace) -> int:
     from rich.console import Console
 
-    from ..bench.render import CASES, run
+    from ..bench.render import CASES, run, turns
     from ._bars import bar
 
     figures = {}
     for case in CASES:
-        with bar(case.name, args.rounds + 3, "views", quiet=args.json) as advance:
+        with bar(case.name, turns(args.rounds) + 1, "turns", quiet=args.json) as advance:
             timings = run(case, args.rounds, args.threads, advance)
         if not args.json:
             Console().print(_table(case.name, args.threads, timings))
