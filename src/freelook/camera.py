@@ -7,9 +7,9 @@ Every renderer in every language does the same few operations with one table:
     pixel = center + stretch @ (p * g)          g = r(theta) / tan(theta/2)
 
 `d` is a ray in the camera frame, of any length, at any angle from the axis but exactly 180
-degrees. g is tabulated at 256 equally spaced |p| = sqrt(t) on [0, sqrt(t_max)] and interpolated
-linearly: in |p| every lens is smooth, those with even powers of theta among them. A ray with
-t > t_max is not seen by the lens.
+degrees. g is tabulated at 256 equal steps of |p| + t, from 0 to that of t_max, and interpolated
+linearly: smooth at the axis for every lens, those with even powers of theta among them, and finer
+towards the rim, where lenses bend most. A ray with t > t_max is not seen by the lens.
 """
 
 from __future__ import annotations
@@ -46,18 +46,24 @@ class RadialTable:
 
     def __call__(self, t: Floats) -> Floats:
         """g at `t`, linear between entries; held constant beyond `t_max`."""
-        places = np.linspace(0.0, np.sqrt(self.t_max), len(self.g))
-        return np.interp(np.sqrt(t), places, self.g)
+        last = np.sqrt(self.t_max) + self.t_max
+        return np.interp(np.sqrt(t) + t, np.linspace(0.0, last, len(self.g)), self.g)
 
 
 def make_table(lens: Lens, theta_max: float) -> RadialTable:
     """Tabulate a lens on [0, theta_max] (radians)."""
-    tangent = np.linspace(0.0, np.tan(theta_max / 2), TABLE_SIZE)
-    g = _exact_g(lens, tangent, theta_max).astype(np.float32)
-    between = (tangent[1:] + tangent[:-1]) / 2
+    t_max = np.tan(theta_max / 2) ** 2
+    places = np.linspace(0.0, np.sqrt(t_max) + t_max, TABLE_SIZE)
+    g = _exact_g(lens, _tangent(places), theta_max).astype(np.float32)
+    between = _tangent((places[1:] + places[:-1]) / 2)
     table_g = (g[1:].astype(np.float64) + g[:-1]) / 2
     residual = np.abs(table_g - _exact_g(lens, between, theta_max)) * between
-    return RadialTable(g, float(tangent[-1] ** 2), float(residual.max()))
+    return RadialTable(g, float(t_max), float(residual.max()))
+
+
+def _tangent(place: Floats) -> Floats:
+    """tan(theta/2) = |p| where |p| + |p|^2 = place."""
+    return np.asarray((np.sqrt(1 + 4 * place) - 1) / 2)
 
 
 def _exact_g(lens: Lens, tangent: Floats, theta_max: float) -> Floats:

@@ -75,7 +75,7 @@ def project_nodes(
     f32 = np.float32
     cx, cy, focal = f32((size[0] - 1) / 2), f32((size[1] - 1) / 2), f32(focal_px)
     r = camera_from_view
-    last = f32(len(g) - 1)
+    per_place = f32(len(g) - 1) / (np.sqrt(t_max) + t_max)
     far = FAR * t_max
     for row in range(nodes.shape[1]):
         y = (f32(first_row + (row - 1) * step) - cy) / focal
@@ -91,7 +91,7 @@ def project_nodes(
             if t > far:
                 shrink = np.sqrt(far / t)
                 px, py, t = px * shrink, py * shrink, far
-            gain = look_up(g, np.sqrt(t / t_max) * last)
+            gain = look_up(g, (np.sqrt(t) + t) * per_place)
             px, py = px * gain, py * gain
             nodes[0, row, column] = center[0] + stretch[0, 0] * px + stretch[0, 1] * py
             nodes[1, row, column] = center[1] + stretch[1, 0] * px + stretch[1, 1] * py

@@ -19,7 +19,7 @@ uniform vec4 picture_from_pixel;   // scale x, y and offset x, y: from view to p
 uniform vec2 view_center;
 uniform float view_focal_px;
 uniform mat3 camera_from_view;
-uniform highp sampler2D lens_g;    // 256 x 1, float: g at equally spaced sqrt(t) up to lens_t_max
+uniform highp sampler2D lens_g;    // 256 x 1, float: g at equal steps of sqrt(t) + t up to lens_t_max
 uniform float lens_t_max;
 uniform vec2 lens_center;
 uniform mat2 lens_stretch;
@@ -85,7 +85,8 @@ void main() {
 
 float g_at(float t) {
     int last = textureSize(lens_g, 0).x - 1;
-    float place = sqrt(clamp(t / lens_t_max, 0.0, 1.0)) * float(last);
+    float seen = min(t, lens_t_max);
+    float place = (sqrt(seen) + seen) / (sqrt(lens_t_max) + lens_t_max) * float(last);
     int low = min(int(place), last - 1);
     float g_low = texelFetch(lens_g, ivec2(low, 0), 0).r;
     float g_high = texelFetch(lens_g, ivec2(low + 1, 0), 0).r;

@@ -47,7 +47,7 @@ export class Camera {
     const [px, py] = [x / depth, y / depth];
     const t = px * px + py * py;
     if (!(t <= this.tMax)) return null;
-    const place = Math.sqrt(t / this.tMax) * (this.g.length - 1);
+    const place = (Math.sqrt(t) + t) / (Math.sqrt(this.tMax) + this.tMax) * (this.g.length - 1);
     const low = Math.min(Math.floor(place), this.g.length - 2);
     const g = this.g[low] + (this.g[low + 1] - this.g[low]) * (place - low);
     const [[a, b], [c, d]] = this.stretch;
