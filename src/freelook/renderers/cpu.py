@@ -23,7 +23,7 @@ from ..viewport import Viewport
 from . import kernels
 from .blank import black_of, check_fits, plane_scales
 
-BAND_PIXELS = 160_000  # measured: the least time between cache misses and calls
+BAND_ROWS = 128  # measured; a multiple of the node spacing, so that no node is computed twice
 
 FloatMap = NDArray[np.float32]
 _Band = Callable[[int, int, "_Scratch"], None]
@@ -69,7 +69,7 @@ class CpuRenderer:
                 if rim:
                     _feather(band, maps[2], camera.table.t_max, black)
 
-        self._run(render_band, _bands(viewport.size, self._threads))
+        self._run(render_band, _bands(viewport.size[1]))
         return Picture(picture.layout, view, picture.color)
 
     def _constants_of(self, camera: Camera, viewport: Viewport) -> _Constants:
@@ -99,7 +99,7 @@ def coordinates(camera: Camera, camera_from_view: Rotation, viewport: Viewport) 
     constants = _constants(camera, viewport)
     width, height = viewport.size
     pixels = np.empty((2, height, width), np.float32)
-    for first_row, rows in _bands(viewport.size, 1):
+    for first_row, rows in _bands(height):
         maps, none = _Scratch().maps(width, rows, False)
         if kernels.fill_band(first_row, rotation, *constants, maps, none):
             maps[:2, maps[2] > camera.table.t_max] = np.nan
@@ -140,20 +140,9 @@ def _constants(camera: Camera, viewport: Viewport) -> _Constants:
 
 
 @lru_cache
-def _bands(size: tuple[int, int], threads: int) -> list[tuple[int, int]]:
-    """(first row, rows) of the bands; all start at an even row.
-
-    The last ones are smaller, so that no thread has to wait long for another.
-    """
-    width, height = size
-    whole = max(16, BAND_PIXELS // width // 2 * 2)
-    bands, first = [], 0
-    while first < height:
-        fair = -(-(height - first) // (3 * threads)) if threads > 1 else height
-        rows = min(whole, max(16, fair // 2 * 2), height - first)
-        bands.append((first, rows))
-        first += rows
-    return bands
+def _bands(height: int) -> list[tuple[int, int]]:
+    """(first row, rows) of the bands of a view."""
+    return [(row, min(BAND_ROWS, height - row)) for row in range(0, height, BAND_ROWS)]
 
 
 def _sample(plane: Plane, maps: FloatMap, black: int, out: Plane) -> None:
