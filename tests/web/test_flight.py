@@ -79,7 +79,8 @@ def test_demo_shows_a_moving_world_and_a_moving_head(browser: Any, wait_until: W
     with running("demo") as (process, url), opened(browser, url) as page:
         wait_until(lambda: drawn(page) > 10, 90, "pictures in the page")
         stats = page.stats()
-        assert (stats["head"], stats["size"]) == ("wander", [960, 960])
+        assert stats["head"] == "wander"
+        assert stats["size"] in ([720, 720], [960, 960])  # few cores, or more
         first = page.head()
         wait_until(lambda: not is_near(page, first), 5, "another direction")
         page.set_head(0, 0)

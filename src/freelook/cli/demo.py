@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import contextlib
+import os
 import sys
 import time
 from collections import deque
@@ -21,7 +22,9 @@ from ..formats import load_camera
 from .fly import add_flying_arguments, fly
 
 LENS = "demo"
-SIZE = "960x960"
+# simulator, encoder, station and browser share the cores
+FEW_CORES = (os.cpu_count() or 1) < 4
+SIZE, THREADS = ("720x720", "1") if FEW_CORES else ("960x960", "2")
 FPS = "30"
 HEAD = "wander"
 USUAL_START_S = 4.0
@@ -69,7 +72,7 @@ async def simulated_camera(address: str) -> None:
     """
     child = await asyncio.create_subprocess_exec(
         *(sys.executable, "-m", f"{__package__}._leashed", "simulate", address),
-        *("--lens", LENS, "--size", SIZE, "--fps", FPS),
+        *("--lens", LENS, "--size", SIZE, "--fps", FPS, "--threads", THREADS),
         stdin=asyncio.subprocess.PIPE,
         stdout=asyncio.subprocess.DEVNULL,
         stderr=asyncio.subprocess.PIPE,
