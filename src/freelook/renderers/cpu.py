@@ -23,7 +23,8 @@ from ..viewport import Viewport
 from . import kernels
 from .blank import black_of, check_fits, plane_scales
 
-BAND_ROWS = 128  # measured; a multiple of the node spacing, so that no node is computed twice
+# measured; multiples of the node spacings, so that no node is computed twice
+BAND_ROWS = (128, 144, 112, 96)
 
 FloatMap = NDArray[np.float32]
 _Band = Callable[[int, int, "_Scratch"], None]
@@ -69,7 +70,7 @@ class CpuRenderer:
                 if rim:
                     _feather(band, maps[2], camera.table.t_max, black)
 
-        self._run(render_band, _bands(viewport.size[1]))
+        self._run(render_band, _bands(viewport.size[1], self._threads))
         return Picture(picture.layout, view, picture.color)
 
     def _constants_of(self, camera: Camera, viewport: Viewport) -> _Constants:
@@ -99,7 +100,7 @@ def coordinates(camera: Camera, camera_from_view: Rotation, viewport: Viewport) 
     constants = _constants(camera, viewport)
     width, height = viewport.size
     pixels = np.empty((2, height, width), np.float32)
-    for first_row, rows in _bands(height):
+    for first_row, rows in _bands(height, 1):
         maps, none = _Scratch().maps(width, rows, False)
         if kernels.fill_band(first_row, rotation, *constants, maps, none):
             maps[:2, maps[2] > camera.table.t_max] = np.nan
@@ -140,9 +141,11 @@ def _constants(camera: Camera, viewport: Viewport) -> _Constants:
 
 
 @lru_cache
-def _bands(height: int) -> list[tuple[int, int]]:
-    """(first row, rows) of the bands of a view."""
-    return [(row, min(BAND_ROWS, height - row)) for row in range(0, height, BAND_ROWS)]
+def _bands(height: int, threads: int) -> list[tuple[int, int]]:
+    """(first row, rows) of the bands of a view: the same number for every thread, if possible."""
+    fair = (rows for rows in BAND_ROWS if -(-height // rows) % threads == 0)
+    rows = next(fair, BAND_ROWS[0])
+    return [(row, min(rows, height - row)) for row in range(0, height, rows)]
 
 
 def _sample(plane: Plane, maps: FloatMap, black: int, out: Plane) -> None:
