@@ -10,9 +10,11 @@ from .session import Session
 from .types import AccessUnit, Frame, Sink
 
 
-def decoded(units: Iterable[AccessUnit]) -> Iterator[Frame]:
-    """All frames of a recording, in the order they are shown."""
-    decoder = Decoder(low_delay=False)
+def decoded(units: Iterable[AccessUnit], decoder: Decoder) -> Iterator[Frame]:
+    """All frames of a recording, in the order they are shown.
+
+    The decoder, made with low_delay=False, counts what was damaged.
+    """
     for unit in units:
         yield from decoder.decode(unit)
     yield from decoder.flush()

@@ -186,6 +186,19 @@ def test_interrupted_what_was_written_plays(folder: Path, lens: Path, tmp_path: 
         assert sum(1 for _ in container.decode(video=0)) > 5
 
 
+@pytest.mark.data
+def test_damaged_pictures_are_told(
+    folder: Path, lens: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data = bytearray((folder / "cam2.mp4").read_bytes())
+    middle = len(data) // 2
+    data[middle : middle + 40_000] = bytes(40_000)
+    (tmp_path / "damaged.mp4").write_bytes(data)
+    command = ["render", str(tmp_path / "damaged.mp4"), str(tmp_path / "out.mp4")]
+    assert main([*command, "--lens", str(lens), "--size", "160x90"]) == 0
+    assert "damaged pictures" in capsys.readouterr().err
+
+
 def test_a_picture_in_and_out(tmp_path: Path) -> None:
     camera = load_camera("demo")
     shot = np.full((960, 960, 3), (30, 120, 220), np.uint8)  # OpenCV's order: an orange

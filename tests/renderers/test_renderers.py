@@ -96,6 +96,15 @@ def test_coordinates_equal_the_exact_projection(camera: Camera, hfov_deg: float)
     assert compared > 10_000
 
 
+@pytest.mark.parametrize("height", [3, 9, 136, 137])
+def test_short_bands_are_as_exact(height: int) -> None:
+    """A few rows left over for the last band, or a view of a few rows altogether."""
+    camera = make_camera(SIZE, Equidistant(150.0), field_deg=188)
+    viewport, ahead = Viewport((320, height), 150.0), RDF_FROM_FRD * body_from_view(3, 2, 1)
+    ours = np.moveaxis(coordinates(camera, ahead, viewport), 0, -1)
+    assert np.abs(ours - exact_coordinates(camera, ahead, viewport)).max() < 0.01
+
+
 @pytest.mark.parametrize("layout", ["gray", "i420", "nv12", "rgb24"])
 @pytest.mark.parametrize("threads", [1, 3])
 def test_views_equal_the_reference(camera: Camera, layout: Layout, threads: int) -> None:

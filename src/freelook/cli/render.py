@@ -85,11 +85,13 @@ def _render_picture(args: argparse.Namespace, camera: Camera, aim: Aim, viewport
 
 
 def _render_video(args: argparse.Namespace, camera: Camera, aim: Aim, viewport: Viewport) -> None:
+    from ..media.decoder import Decoder
     from ..offline import decoded
     from ..sources import file
 
     source = file.FileSource(args.input, loop=False, pace=False, clock=lambda: 0)
-    frames = decoded(source.units())
+    decoder = Decoder(low_delay=False)
+    frames = decoded(source.units(), decoder)
     first = next(frames, None)
     if first is None:
         raise SourceError(f"{args.input}: not a single picture in it can be decoded")
@@ -104,6 +106,8 @@ def _render_video(args: argparse.Namespace, camera: Camera, aim: Aim, viewport: 
         fps=source.frames_per_s,
         audio_from=args.input,
     )
+    if damaged := decoder.counters["undecodable"] + decoder.counters["corrupt"]:
+        print(f"{args.input}: {damaged} damaged pictures, left out or patched up", file=sys.stderr)
 
 
 def _write(

@@ -10,7 +10,8 @@ from ..camera import Camera
 from ..gimbal import Aim
 from ..head import HeadStatus
 from ..ingest import IngestStatus
-from ..rotations import FRD_FROM_RDF, RDF_FROM_FRD, to_wxyz
+from ..rotations import RDF_FROM_FRD, to_wxyz
+from ..session import camera_from_head
 from ..types import Counters
 
 LONGEST_MESSAGE = 1000
@@ -87,7 +88,7 @@ def camera_table(camera: Camera) -> dict[str, Any]:
         "stretch": camera.stretch.tolist(),
         "t_max": camera.table.t_max,
         "g": [float(value) for value in camera.table.g],
-        "camera_from_head": (camera.camera_from_body * FRD_FROM_RDF).as_matrix().tolist(),
+        "camera_from_head": camera_from_head(camera).as_matrix().tolist(),
     }
 
 
