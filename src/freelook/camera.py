@@ -4,12 +4,15 @@ Every renderer in every language does the same few operations with one table:
 
     p = d.xy / (|d| + d.z)             stereographic coordinate, |p| = tan(theta/2)
     t = p . p                          = tan^2(theta/2)
-    pixel = center + stretch @ (p * g)          g = r(theta) / tan(theta/2)
+    pixel = center + stretch @ (p * g + e)      g = r(theta) / tan(theta/2)
 
 `d` is a ray in the camera frame, of any length, at any angle from the axis but exactly 180
 degrees. g is tabulated at 256 equal steps of |p| + t, from 0 to that of t_max, and interpolated
 linearly: smooth at the axis for every lens, those with even powers of theta among them, and finer
 towards the rim, where lenses bend most. A ray with t > t_max is not seen by the lens.
+
+e is there only for lenses that are not round (tangential terms and the like): a small grid of
+offsets over the square [-p_max, p_max]^2 of p, interpolated bilinearly. Most cameras have none.
 """
 
 from __future__ import annotations
@@ -22,7 +25,15 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from .errors import ProfileError
-from .lens import Floats, Lens, angle_at_radius, growth_limit, radius_slope
+from .lens import (
+    BentLens,
+    Floats,
+    Lens,
+    angle_at_radius,
+    growth_limit,
+    image_point,
+    radius_slope,
+)
 from .rotations import RDF_FROM_FRD
 
 TABLE_SIZE = 256
@@ -30,6 +41,8 @@ TABLE_SIZE = 256
 # (0.15 px at 160 degrees and f = 300), so nothing is claimed there.
 WIDEST_RAD = np.radians(140.0)
 NARROWEST_RAD = np.radians(0.5)
+GRID_SIZES = (17, 33, 65, 129)
+GRID_TOLERANCE_PX = 0.004
 
 
 @dataclass(frozen=True)
@@ -75,6 +88,63 @@ def _exact_g(lens: Lens, tangent: Floats, theta_max: float) -> Floats:
 
 
 @dataclass(frozen=True)
+class OffsetGrid:
+    """e for lenses that are not round: `offsets` float32 (n, n, 2), pixels before the stretch.
+
+    Entry [j, i] belongs to p = (-p_max + i step, -p_max + j step), step = 2 p_max / (n - 1).
+    `residual_px` is the largest distance between grid and formula where the lens sees, measured
+    in the middle of every cell, where bilinear interpolation is worst.
+    """
+
+    offsets: NDArray[np.float32]
+    p_max: float
+    residual_px: float
+
+    def __call__(self, p: Floats) -> Floats:
+        """e (..., 2) at `p` (..., 2), bilinear between entries; held constant outside."""
+        last = len(self.offsets) - 1
+        place = np.clip((p / self.p_max + 1) * (last / 2), 0, last)
+        low = np.minimum(place.astype(int), last - 1)
+        part = (place - low)[..., None]
+        column, row = low[..., 0], low[..., 1]
+        e = self.offsets.astype(np.float64)
+        top = e[row, column] * (1 - part[..., 0, :]) + e[row, column + 1] * part[..., 0, :]
+        below = (
+            e[row + 1, column] * (1 - part[..., 0, :]) + e[row + 1, column + 1] * part[..., 0, :]
+        )
+        return np.asarray(top * (1 - part[..., 1, :]) + below * part[..., 1, :])
+
+
+def make_grid(lens: BentLens, theta_max: float) -> OffsetGrid:
+    """The smallest of a few grids that strays less than 0.004 px, or the largest of them."""
+    for size in GRID_SIZES:
+        grid = _grid(lens, theta_max, size)
+        if grid.residual_px < GRID_TOLERANCE_PX:
+            break
+    return grid
+
+
+def _grid(lens: BentLens, theta_max: float, size: int) -> OffsetGrid:
+    p_max = float(np.tan(theta_max / 2))
+    across = np.linspace(-p_max, p_max, size)
+    # the nodes just outside the field hold up the cells on its rim; those farther off hold nothing
+    reach = min(p_max * (1 + 3 / (size - 1)), np.tan(np.nextafter(lens.hard_limit, 0) / 2))
+    offsets = _offset_at(lens, across, reach).astype(np.float32)
+    o = offsets.astype(np.float64)
+    middle = (o[1:, 1:] + o[1:, :-1] + o[:-1, 1:] + o[:-1, :-1]) / 4
+    between = (across[1:] + across[:-1]) / 2
+    seen = np.hypot(*np.meshgrid(between, between)) <= p_max
+    strays = np.linalg.norm(middle - _offset_at(lens, between, reach), axis=-1)[seen]
+    return OffsetGrid(offsets, p_max, float(strays.max()))
+
+
+def _offset_at(lens: BentLens, across: Floats, reach: float) -> Floats:
+    x, y = np.meshgrid(across, across)
+    theta = 2 * np.arctan(np.minimum(np.hypot(x, y), reach))
+    return np.asarray(lens.offset(theta, np.arctan2(y, x)))
+
+
+@dataclass(frozen=True)
 class Camera:
     """A lens on a sensor on a vehicle.
 
@@ -95,7 +165,17 @@ class Camera:
 
     @cached_property
     def table(self) -> RadialTable:
+        """What renderers know of the lens; with `grid`, if it is not round."""
         return make_table(self.lens, self.theta_max)
+
+    @cached_property
+    def grid(self) -> OffsetGrid | None:
+        return make_grid(self.lens, self.theta_max) if isinstance(self.lens, BentLens) else None
+
+    @property
+    def residual_px(self) -> float:
+        """How far table and grid stray from the exact formula at most, before the stretch."""
+        return self.table.residual_px + (self.grid.residual_px if self.grid else 0.0)
 
     def project(self, ray_in_camera: Floats) -> Floats:
         """Rays (..., 3) of any length to pixels (..., 2), exactly; NaN where not seen.
@@ -106,17 +186,26 @@ class Camera:
         seen = theta <= self.theta_max
         radius = self.lens.radius(np.where(seen, theta, 0.0))
         scale = np.divide(radius, sine, out=np.zeros_like(sine), where=sine > 0)
-        pixel = np.asarray(self.center) + (xy * scale[..., None]) @ self.stretch.T
+        point = xy * scale[..., None]
+        if isinstance(self.lens, BentLens):
+            point += self.lens.offset(
+                np.where(seen, theta, 0.0), np.arctan2(xy[..., 1], xy[..., 0])
+            )
+        pixel = np.asarray(self.center) + point @ self.stretch.T
         pixel[~seen] = np.nan
         return np.asarray(pixel)
 
     def ray(self, pixel: Floats) -> Floats:
         """Pixels (..., 2) to unit rays in the camera frame (..., 3); NaN outside the field."""
-        offset = (np.asarray(pixel, dtype=np.float64) - self.center) @ np.linalg.inv(self.stretch).T
-        radius = np.hypot(offset[..., 0], offset[..., 1])
+        point = (np.asarray(pixel, dtype=np.float64) - self.center) @ np.linalg.inv(self.stretch).T
+        if isinstance(self.lens, BentLens):
+            theta, phi = _angles_of(self.lens, point, self.theta_max)
+            sine = np.sin(theta)
+            return np.stack([sine * np.cos(phi), sine * np.sin(phi), np.cos(theta)], axis=-1)
+        radius = np.hypot(point[..., 0], point[..., 1])
         theta = np.asarray(angle_at_radius(self.lens, radius, self.theta_max))
-        sine = np.divide(np.sin(theta), radius, out=np.zeros_like(radius), where=radius > 0)
-        return np.concatenate([offset * sine[..., None], np.cos(theta)[..., None]], axis=-1)
+        scale = np.divide(np.sin(theta), radius, out=np.zeros_like(radius), where=radius > 0)
+        return np.concatenate([point * scale[..., None], np.cos(theta)[..., None]], axis=-1)
 
     def resized(self, size: tuple[int, int]) -> Camera:
         """The same camera delivering its whole picture at another size."""
@@ -130,6 +219,61 @@ class Camera:
             np.diag(scale) @ self.stretch,
             self.camera_from_body,
         )
+
+
+def _angles_of(lens: BentLens, point: Floats, theta_max: float) -> tuple[Floats, Floats]:
+    """(theta, phi) of image points (..., 2) of a lens that is not round; NaN outside the field.
+
+    Newton's method in the plane of p, which has no pole inside any field, from the round lens's
+    answer. A point that does not close to 1e-6 px has none.
+    """
+    shape = point.shape[:-1]
+    point = point.reshape(-1, 2)
+    theta = angle_at_radius(lens, np.hypot(point[:, 0], point[:, 1]), theta_max)
+    theta = np.where(np.isnan(theta), theta_max, theta)
+    phi = np.arctan2(point[:, 1], point[:, 0])
+    p = np.tan(theta / 2)[:, None] * np.stack([np.cos(phi), np.sin(phi)], axis=-1)
+    reach = min(1.05 * np.tan(theta_max / 2), np.tan(np.nextafter(lens.hard_limit, 0) / 2))
+    open_ = np.arange(len(p))  # those that have not closed yet
+    for _ in range(12):
+        error = point[open_] - _point_at(lens, p[open_], reach)
+        left = np.abs(error).max(axis=-1, initial=0) > 1e-10
+        open_, error = open_[left], error[left]
+        if not len(open_):
+            break
+        stepped = p[open_] + _solve(_slopes(lens, p[open_], reach), error)
+        length = np.maximum(np.hypot(stepped[:, 0], stepped[:, 1]), reach)[:, None]
+        p[open_] = stepped * (reach / length)
+    theta = 2 * np.arctan(np.hypot(p[:, 0], p[:, 1]))
+    closed = np.abs(point - _point_at(lens, p, reach)).max(axis=-1, initial=0) < 1e-6
+    theta[~closed | (theta > theta_max + 1e-12)] = np.nan
+    return theta.reshape(shape), np.arctan2(p[:, 1], p[:, 0]).reshape(shape)
+
+
+def _solve(matrices: Floats, values: Floats) -> Floats:
+    """x of matrices @ x = values for many 2 x 2 matrices; no step at all where there is none."""
+    (a, b), (c, d) = matrices[:, 0].T, matrices[:, 1].T
+    determinant = a * d - b * c
+    solved = np.stack(
+        [d * values[:, 0] - b * values[:, 1], a * values[:, 1] - c * values[:, 0]], axis=-1
+    )
+    usable = (np.abs(determinant) > 1e-12)[:, None]
+    return np.divide(solved, determinant[:, None], out=np.zeros_like(solved), where=usable)
+
+
+def _point_at(lens: Lens, p: Floats, reach: float) -> Floats:
+    length = np.minimum(np.hypot(p[..., 0], p[..., 1]), reach)
+    return image_point(lens, 2 * np.arctan(length), np.arctan2(p[..., 1], p[..., 0]))
+
+
+def _slopes(lens: Lens, p: Floats, reach: float) -> Floats:
+    """d point / d p, (n, 2, 2), by central differences."""
+    step = 1e-6
+    columns = [
+        (_point_at(lens, p + h, reach) - _point_at(lens, p - h, reach)) / (2 * step)
+        for h in step * np.eye(2)
+    ]
+    return np.stack(columns, axis=-1)
 
 
 def _polar(ray: Floats) -> tuple[Floats, Floats, Floats]:
@@ -172,6 +316,8 @@ def make_camera(
         if field_deg is None
         else _claimed_angle(lens, field_deg, limit)
     )
+    if isinstance(lens, BentLens):
+        theta_max = _unfolded(lens, theta_max, field_deg)
     rim = float(lens.radius(np.array([theta_max]))[0])
     if rim < 1:
         raise ProfileError(
@@ -195,6 +341,25 @@ def _claimed_angle(lens: Lens, field_deg: float, limit: float) -> float:
     return _below_pole(lens, min(half, limit))
 
 
+def _unfolded(lens: BentLens, theta_max: float, field_deg: float | None) -> float:
+    """The angle, at most theta_max, up to which no two rays land on one pixel."""
+    p = np.tan(np.linspace(0, theta_max, 181)[1:] / 2)
+    phi = np.radians(np.arange(0, 360, 5))[:, None, None]
+    around = np.concatenate([np.cos(phi), np.sin(phi)], axis=-1) * p[:, None]
+    reach = np.tan(np.nextafter(lens.hard_limit, 0) / 2)
+    slopes = _slopes(lens, around.reshape(-1, 2), reach)
+    folds = (np.linalg.det(slopes) <= 0).reshape(len(phi), len(p)).any(axis=0)
+    if not folds.any():
+        return theta_max
+    limit = theta_max * float(np.argmax(folds)) / 180
+    if field_deg is not None or limit < NARROWEST_RAD:
+        raise ProfileError(
+            f"this {type(lens).__name__} lens folds at {np.degrees(limit):.1f} degrees from the "
+            "axis: two rays land on one pixel; claim a smaller field_deg, or check the parameters"
+        )
+    return limit
+
+
 def _below_pole(lens: Lens, theta: float) -> float:
     """Keep a hair away from an angle where the formula is infinite (tan at 90 degrees)."""
     return min(theta, lens.hard_limit - 1e-3) if lens.hard_limit < np.pi else theta
@@ -208,8 +373,10 @@ def _corner_angle(
     limit: float,
 ) -> float:
     corners = np.array([[x, y] for x in (-0.5, size[0] - 0.5) for y in (-0.5, size[1] - 0.5)])
-    offset = (corners - center) @ np.linalg.inv(stretch).T
-    farthest = float(np.hypot(offset[:, 0], offset[:, 1]).max())
+    point = (corners - center) @ np.linalg.inv(stretch).T
     limit = _below_pole(lens, min(limit, WIDEST_RAD))
-    angle = angle_at_radius(lens, np.array([farthest]), limit)[0]
-    return limit if np.isnan(angle) else float(angle)
+    if isinstance(lens, BentLens):
+        angles, _ = _angles_of(lens, point, limit)
+    else:
+        angles = angle_at_radius(lens, np.hypot(point[:, 0], point[:, 1]), limit)
+    return limit if np.isnan(angles).any() else float(angles.max())

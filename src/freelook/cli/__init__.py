@@ -14,7 +14,7 @@ from importlib import import_module
 from .. import __version__
 from ..errors import FreelookError, MissingExtra
 
-COMMANDS = ("demo", "fly", "render", "simulate", "bench", "doctor")
+COMMANDS = ("demo", "fly", "render", "simulate", "lens", "bench", "doctor")
 
 EXTRA_OF = {
     "aiohttp": "web",
@@ -24,6 +24,7 @@ EXTRA_OF = {
     "cryptography": "web",
     "ifaddr": "web",
     "cv2": "render",
+    "matplotlib": "plot",
     "numba": "render",
     "playwright": "bench",
     "rich": "cli",

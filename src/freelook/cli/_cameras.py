@@ -2,32 +2,56 @@
 
 from __future__ import annotations
 
+import argparse
 import dataclasses
 import math
-from collections.abc import Sequence
 
 from ..camera import Camera
 from ..errors import FreelookError
-from ..formats import builtin_names, load_camera
+from ..formats import FORMATS, Profile, builtin_names, load_profile
 from ..rotations import body_from_view
+from ._arguments import size, three_angles
 
-LENS_HELP = f"lens profile: a file, or one of: {', '.join(builtin_names())}"
+LENS_HELP = (
+    "lens profile: a file of any known format (FILE#NAME for one of several cameras in it), "
+    f"or one of: {', '.join(builtin_names())}"
+)
 MOUNT_HELP = (
     "how the camera is fixed to the vehicle, degrees right, up, right side down "
     "(write --mount=-10,0,0 with a leading minus)"
 )
 
 
-def mounted_camera(lens: str | None, mount: Sequence[float] | None) -> Camera:
-    """The camera of a lens profile, turned as it is mounted."""
-    if lens is None:
+def add_lens_arguments(parser: argparse.ArgumentParser) -> None:
+    """--lens and what goes with it; `lens_profile` and `mounted_camera` read them."""
+    parser.add_argument("--lens", metavar="PROFILE", help=LENS_HELP)
+    parser.add_argument(
+        "--lens-format", choices=FORMATS, metavar="FORMAT", help="if it is not recognised rightly"
+    )
+    parser.add_argument(
+        "--lens-size",
+        type=size,
+        metavar="WxH",
+        help="picture size the profile is for, where it does not say so itself",
+    )
+    parser.add_argument("--mount", type=three_angles, metavar="YAW,PITCH,ROLL", help=MOUNT_HELP)
+
+
+def lens_profile(args: argparse.Namespace, name: str) -> Profile:
+    """The profile of this name, read as --lens-format and --lens-size say."""
+    return load_profile(name, format=args.lens_format, size=args.lens_size)
+
+
+def mounted_camera(args: argparse.Namespace) -> Camera:
+    """The camera of --lens, turned as --mount says."""
+    if args.lens is None:
         raise FreelookError(
             "which lens does the camera have? give --lens PROFILE, a file or one of: "
             + ", ".join(builtin_names())
         )
-    camera = load_camera(lens)
-    if mount is None:
+    camera = lens_profile(args, args.lens).camera
+    if args.mount is None:
         return camera
-    if not all(map(math.isfinite, mount)):
-        raise FreelookError(f"--mount takes three angles in degrees, not {mount}")
-    return dataclasses.replace(camera, camera_from_body=body_from_view(*mount).inv())
+    if not all(map(math.isfinite, args.mount)):
+        raise FreelookError(f"--mount takes three angles in degrees, not {args.mount}")
+    return dataclasses.replace(camera, camera_from_body=body_from_view(*args.mount).inv())

@@ -20,8 +20,7 @@ from ..gimbal import Gimbal, GimbalSettings
 from ..head import Head
 from ..trackers import known_trackers, open_tracker
 from ..viewport import Viewport
-from ._arguments import three_angles
-from ._cameras import LENS_HELP, MOUNT_HELP, mounted_camera
+from ._cameras import add_lens_arguments, mounted_camera
 from ._progress import StatusLine, say
 
 if TYPE_CHECKING:  # the web libraries are slow to load, and may be missing
@@ -40,9 +39,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="SOURCE",
         help=f"a file, device or address, or KIND:ARGUMENT (kinds: {', '.join(source_kinds())})",
     )
-    parser.add_argument("--lens", metavar="PROFILE", help=LENS_HELP)
+    add_lens_arguments(parser)
     parser.add_argument("--loop", action="store_true", help="play a recording over and over")
-    parser.add_argument("--mount", type=three_angles, metavar="YAW,PITCH,ROLL", help=MOUNT_HELP)
     add_flying_arguments(parser)
 
 
@@ -105,7 +103,7 @@ def run(args: argparse.Namespace) -> int:
     from ..sources import open_source
     from ..web.station import About
 
-    camera = mounted_camera(args.lens, args.mount)
+    camera = mounted_camera(args)
     ingest = Ingest(lambda: open_source(args.source, loop=args.loop))
     about = About(args.source, False, args.hold, args.ease, args.hfov)
     fly(args, ingest, camera, about, never)

@@ -23,15 +23,14 @@ from ..rotations import body_from_view
 from ..session import Aim, Session
 from ..types import ColorSpace, Frame
 from ..viewport import Viewport
-from ._arguments import size, three_angles
-from ._cameras import LENS_HELP, MOUNT_HELP, mounted_camera
+from ._arguments import size
+from ._cameras import add_lens_arguments, mounted_camera
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("input", metavar="IN", help="a video file or a picture")
     parser.add_argument("output", metavar="OUT", help="a video file (.mp4, .mkv) or a picture")
-    parser.add_argument("--lens", metavar="PROFILE", help=LENS_HELP)
-    parser.add_argument("--mount", type=three_angles, metavar="YAW,PITCH,ROLL", help=MOUNT_HELP)
+    add_lens_arguments(parser)
     for name, to in (("yaw", "right"), ("pitch", "up"), ("roll", "right ear down")):
         parser.add_argument(
             f"--{name}", type=float, default=0.0, metavar="DEG", help=f"look this far {to}"
@@ -54,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     from ..media.pictures import is_picture
 
-    camera = mounted_camera(args.lens, args.mount)
+    camera = mounted_camera(args)
     viewport = Viewport(args.size, args.hfov)
     aim = _aim(args)
     if os.path.realpath(args.input) == os.path.realpath(args.output):

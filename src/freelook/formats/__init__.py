@@ -1,22 +1,40 @@
 """Lens profiles: one file per format, found by what the text looks like.
 
-A format module has a one-line docstring (its row in docs/lenses.md) and two functions:
-`recognises(data)` says whether this JSON object is its own, `read(data)` makes the camera or
-raises `ProfileError`.
+A format module has a one-line docstring (its row in docs/lenses.md) and
+
+    SUFFIX                  what its files are usually called at the end, ".json"
+    MODELS                  names of the lens models it can hold
+    recognises(document)    whether this text is its own; never raises
+    read(document, choice)  the `Profile`, or ProfileError saying what is wrong and where
+    write(profile)          its text, or ProfileError when the format cannot say this camera
 """
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping
 from importlib import import_module, resources
 from pathlib import Path
-from typing import Any, NoReturn
+from types import ModuleType
 
 from ..camera import Camera
 from ..errors import ProfileError
+from ._document import LARGEST_BYTES, Document
+from ._profile import Choice, Profile
 
 FORMATS = ("freelook", "opencv")
+
+__all__ = [
+    "FORMATS",
+    "Choice",
+    "Document",
+    "Profile",
+    "builtin_names",
+    "format_module",
+    "format_of",
+    "load_camera",
+    "load_profile",
+    "parse_camera",
+    "parse_profile",
+]
 
 
 def builtin_names() -> list[str]:
@@ -30,95 +48,95 @@ def builtin_names() -> list[str]:
 def load_camera(name: str | Path) -> Camera:
     """Read a lens profile from a file, or one that comes with the package by its name.
 
-    ProfileError when there is no such thing or when it is wrong; the message says where.
+    One of several cameras in a file is named after a `#`: `chain.yaml#cam1`. ProfileError when
+    there is no such thing or when it is wrong; the message says where.
+    """
+    return load_profile(name).camera
+
+
+def load_profile(
+    name: str | Path, *, format: str | None = None, size: tuple[int, int] | None = None
+) -> Profile:
+    """As `load_camera`, with the profile's name, source and notes.
+
+    `format` overrides the guess from what the file looks like; `size` is the picture's, for
+    formats that do not say it.
     """
     try:
-        return parse_camera(_read_text(name))
+        document, pick = _find(str(name))
+        return parse_profile(document, Choice(pick, size), format=format)
     except ProfileError as error:
         raise ProfileError(f"lens profile {name}: {error}") from None
 
 
 def parse_camera(text: str) -> Camera:
     """A camera from the text of a profile in any known format."""
-    try:
-        data = json.loads(text, parse_constant=_no_constant, object_pairs_hook=_no_twins)
-    except RecursionError:
-        raise ProfileError("nested too deeply to be a lens profile") from None
-    except json.JSONDecodeError as error:
-        raise ProfileError(
-            f"not JSON: {error.msg} in line {error.lineno}, column {error.colno}"
-        ) from None
-    if not isinstance(data, dict):
-        raise ProfileError(f"expected a JSON object, not a {type(data).__name__}")
-    for name in FORMATS:
-        module = import_module(f".{name}", __name__)
-        if module.recognises(data):
-            camera: Camera = module.read(data)
-            return camera
-    raise ProfileError(
-        f"not a format known here ({', '.join(FORMATS)}); its keys are: {', '.join(data) or 'none'}"
+    return parse_profile(Document(text)).camera
+
+
+def parse_profile(
+    document: Document, choice: Choice | None = None, *, format: str | None = None
+) -> Profile:
+    """The profile a document describes; ProfileError if it is none or wrong."""
+    profile: Profile = format_module(format or format_of(document)).read(
+        document, choice or Choice()
     )
+    return profile
 
 
-def _read_text(name: str | Path) -> str:
-    path = Path(name)
-    if not path.is_file() and str(name) in builtin_names():
-        return (resources.files("freelook.lenses") / f"{name}.json").read_text("utf-8")
+def format_module(name: str) -> ModuleType:
+    """The module of a format by its name; ProfileError that lists them."""
+    if name not in FORMATS:
+        raise ProfileError(f"unknown format '{name}'; known: {', '.join(FORMATS)}")
+    return import_module(f".{name.replace('-', '_')}", __name__)
+
+
+def format_of(document: Document) -> str:
+    """The name of the format that a text looks like; ProfileError when it is like none."""
+    for name in FORMATS:
+        if format_module(name).recognises(document):
+            return name
+    raise ProfileError(_why_none(document))
+
+
+def _why_none(document: Document) -> str:
+    if document.looks_like_json and document.why_not_json:
+        return document.why_not_json
+    known = f"not a format known here ({', '.join(FORMATS)})"
+    data = document.json if document.looks_like_json else document.yaml
+    if isinstance(data, dict):
+        return f"{known}; its keys are: {', '.join(list(data)[:20]) or 'none'}"
+    if document.why_not_yaml and not document.looks_like_json:
+        return f"{known}; {document.why_not_yaml}"
+    return f"{known}: a {type(data).__name__}" if data is not None else f"{known}: it is empty"
+
+
+def _find(name: str) -> tuple[Document, str | None]:
+    """The text of a file or built-in profile, and what stands behind `#`."""
+    path, pick = Path(name), None
+    if not path.exists() and "#" in name:
+        before, _, pick = name.rpartition("#")
+        path = Path(before)
+    if not path.exists() and str(path) in builtin_names():
+        text = (resources.files("freelook.lenses") / f"{path}.json").read_text("utf-8")
+        return Document(text, f"{path}.json"), pick
+    return Document(_read_text(path), path.name), pick
+
+
+def _read_text(path: Path) -> str:
     try:
-        return path.read_text("utf-8")
-    except UnicodeDecodeError:
-        raise ProfileError("not a text file") from None
+        with path.open("rb") as file:
+            data = file.read(LARGEST_BYTES + 1)
     except OSError as error:
         known = ", ".join(builtin_names())
         raise ProfileError(
             f"{error.strerror or error}; give a profile file or one of: {known}"
         ) from None
-
-
-def _no_constant(text: str) -> NoReturn:
-    raise ProfileError(f"{text} is not a number a lens can have")
-
-
-def _no_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    names = [name for name, _ in pairs]
-    for name in names:
-        if names.count(name) > 1:
-            raise ProfileError(f"key '{name}' is given twice")
-    return dict(pairs)
-
-
-def check_keys(data: Mapping[str, Any], required: set[str], optional: set[str], where: str) -> None:
-    """ProfileError for a missing or an unknown key, listing the known ones."""
-    known = sorted(required | optional)
-    for key in data:
-        if key not in known:
-            raise ProfileError(f"unknown key '{key}' in {where}; known: {', '.join(known)}")
-    for key in sorted(required - set(data)):
-        raise ProfileError(
-            f"key '{key}' is missing in {where}; needed: {', '.join(sorted(required))}"
-        )
-
-
-def number(value: Any, where: str) -> float:
-    """A float of a sane size, or ProfileError."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise ProfileError(f"{where} must be a number, not {value!r}")
-    if not (value == 0 or 1e-30 < abs(value) < 1e12):
-        raise ProfileError(f"{where} = {value} is not a number a lens can have")
-    return float(value)
-
-
-def numbers(value: Any, count: int, where: str) -> list[float]:
-    """A list of `count` finite floats, or ProfileError."""
-    if not isinstance(value, list) or len(value) != count:
-        raise ProfileError(f"{where} must be a list of {count} numbers, not {value!r}")
-    return [number(item, f"{where}[{i}]") for i, item in enumerate(value)]
-
-
-def picture_size(value: Any, where: str) -> tuple[int, int]:
-    """(width, height) as whole pixels of a picture that can exist, or ProfileError."""
-    width, height = numbers(value, 2, where)
-    for side in (width, height):
-        if side != int(side) or not 2 <= side <= 65536:
-            raise ProfileError(f"{where} must be two whole numbers of 2 to 65536, not {value}")
-    return int(width), int(height)
+    except ValueError:  # a name with a NUL in it
+        raise ProfileError("not the name of a file") from None
+    if len(data) > LARGEST_BYTES:
+        raise ProfileError(f"more than {LARGEST_BYTES >> 20} MiB; that is no lens profile")
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError:
+        raise ProfileError("not a text file") from None

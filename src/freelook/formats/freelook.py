@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import fields
+import json
+from dataclasses import MISSING, fields
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ..camera import Camera, make_camera
+from ..camera import make_camera
 from ..errors import ProfileError
-from ..lens import MODELS, Lens, model_name, parameters
+from ..lens import MODELS as LENS_MODELS
+from ..lens import Lens, model_name, parameters
 from ..rotations import RDF_FROM_FRD, body_from_view, head_angles_deg
-from . import check_keys, number, numbers, picture_size
+from ._document import Document, expect_mapping
+from ._numbers import check_keys, number, numbers, picture_size
+from ._profile import Choice, Profile
+
+SUFFIX = ".json"
+MODELS = tuple(LENS_MODELS)
 
 VERSION = 1
 REQUIRED = {"freelook_lens", "size", "model", "parameters"}
@@ -21,18 +27,19 @@ OPTIONAL = {"name", "source", "center", "field_deg", "stretch", "mount_deg"}
 ANGLES = ("yaw", "pitch", "roll")
 
 
-def recognises(data: Mapping[str, Any]) -> bool:
-    return "freelook_lens" in data
+def recognises(document: Document) -> bool:
+    return isinstance(document.json, dict) and "freelook_lens" in document.json
 
 
-def read(data: Mapping[str, Any]) -> Camera:
+def read(document: Document, choice: Choice) -> Profile:
     """The camera of a profile; the fields are described in docs/lenses.md."""
+    data = expect_mapping(document.json, "the profile")
     check_keys(data, REQUIRED, OPTIONAL, "the profile")
     if data["freelook_lens"] != VERSION:
         raise ProfileError(
             f"freelook_lens is {data['freelook_lens']!r}; this program reads version {VERSION}"
         )
-    return make_camera(
+    camera = make_camera(
         picture_size(data["size"], "size"),
         _lens(data["model"], data["parameters"]),
         center=_pair(data["center"]) if "center" in data else None,
@@ -40,13 +47,17 @@ def read(data: Mapping[str, Any]) -> Camera:
         stretch=_stretch(data["stretch"]) if "stretch" in data else None,
         camera_from_body=_mount(data["mount_deg"]) if "mount_deg" in data else RDF_FROM_FRD,
     )
+    return Profile(camera, str(data.get("name", "")), str(data.get("source", "")))
 
 
-def write(camera: Camera) -> dict[str, Any]:
-    """The profile of a camera; `read` gives the same camera back."""
+def write(profile: Profile) -> str:
+    """The text of a profile; `read` gives the same camera back."""
+    camera = profile.camera
     yaw, pitch, roll = head_angles_deg(camera.camera_from_body.inv())
-    return {
+    said = {"name": profile.name, "source": profile.source}
+    data = {
         "freelook_lens": VERSION,
+        **{key: text for key, text in said.items() if text},
         "size": list(camera.size),
         "model": model_name(camera.lens),
         "parameters": parameters(camera.lens),
@@ -55,17 +66,27 @@ def write(camera: Camera) -> dict[str, Any]:
         "stretch": camera.stretch.tolist(),
         "mount_deg": {"yaw": yaw, "pitch": pitch, "roll": roll},
     }
+    return json.dumps(data, indent=2) + "\n"
 
 
 def _lens(model: Any, values: Any) -> Lens:
-    if not isinstance(model, str) or model not in MODELS:
-        raise ProfileError(f"unknown model {model!r}; known: {', '.join(MODELS)}")
-    if not isinstance(values, dict):
-        raise ProfileError(f"parameters must be an object, not {values!r}")
-    names = [field.name for field in fields(MODELS[model])]  # type: ignore[arg-type]
-    # the first parameter is the scale, in pixels; the terms behind it default to 0
-    check_keys(values, {names[0]}, set(names), f"the parameters of model '{model}'")
-    return MODELS[model](**{name: number(v, f"parameters.{name}") for name, v in values.items()})
+    if not isinstance(model, str) or model not in LENS_MODELS:
+        raise ProfileError(f"unknown model {model!r:.80}; known: {', '.join(LENS_MODELS)}")
+    values = expect_mapping(values, "parameters")
+    known = fields(LENS_MODELS[model])  # type: ignore[arg-type]
+    # the scale, in pixels, is needed; terms behind it have their defaults
+    needed = {field.name for field in known if field.default is MISSING}
+    names = {field.name for field in known}
+    check_keys(values, needed, names, f"the parameters of model '{model}'")
+    return LENS_MODELS[model](
+        **{name: _value(v, f"parameters.{name}") for name, v in values.items()}
+    )
+
+
+def _value(value: Any, where: str) -> float | tuple[float, ...]:
+    if isinstance(value, list):
+        return tuple(numbers(value, range(1, 4097), where))
+    return number(value, where)
 
 
 def _pair(value: Any) -> tuple[float, float]:
