@@ -139,9 +139,18 @@ def _grid(lens: BentLens, theta_max: float, size: int) -> OffsetGrid:
 
 
 def _offset_at(lens: BentLens, across: Floats, reach: float) -> Floats:
+    """Offsets at all pairs of `across`; from |p| = reach on they go straight on.
+
+    Nobody sees those, but a kink would spoil the interpolation next to the rim.
+    """
     x, y = np.meshgrid(across, across)
-    theta = 2 * np.arctan(np.minimum(np.hypot(x, y), reach))
-    return np.asarray(lens.offset(theta, np.arctan2(y, x)))
+    phi, length = np.arctan2(y, x), np.hypot(x, y)
+    step = 1e-4 * reach
+    inner, held = (
+        lens.offset(2 * np.arctan(np.minimum(length, end)), phi) for end in (reach - step, reach)
+    )
+    beyond = np.maximum(length - reach, 0)[..., None]
+    return np.asarray(held + (held - inner) * (beyond / step))
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ from freelook.lens import (
     Perspective,
     Polynomial,
     Stereographic,
+    ThinPrismFisheye,
 )
 from freelook.renderers.blank import black_of
 from freelook.renderers.cpu import CpuRenderer, coordinates
@@ -39,6 +40,7 @@ LENSES: list[tuple[Lens, float | None]] = [
     (Orthographic(230.0), 180.0),
     (Polynomial(150.0, 2.0, -3.0, 0.5, -0.2), 188.0),
     (KannalaBrandt(158.0, -0.02, 0.003, -0.001, 0.0001), 200.0),
+    (ThinPrismFisheye(158.0, -0.02, 0.003, 4e-3, -2e-3, sx1=-3e-3, sy1=2e-3), 200.0),
 ]
 HEADS = [(0, 0, 0), (35, -20, 10), (-80, 15, -30), (10, 80, 0), (170, 0, 0)]
 

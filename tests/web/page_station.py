@@ -19,23 +19,11 @@ from aiohttp import web
 from numpy.typing import NDArray
 
 from freelook.camera import Camera
-from freelook.rotations import FRD_FROM_RDF
 from freelook.types import Picture
+from freelook.web.messages import camera_table
 from freelook.web.server import HEADERS
 
 PACKAGE = Path(__file__).resolve().parents[2] / "src" / "freelook"
-
-
-def camera_json(camera: Camera) -> dict[str, Any]:
-    """The camera as GET /api/station describes it."""
-    return {
-        "size": list(camera.size),
-        "center": list(camera.center),
-        "stretch": camera.stretch.tolist(),
-        "t_max": camera.table.t_max,
-        "g": [float(value) for value in camera.table.g],
-        "camera_from_head": (camera.camera_from_body * FRD_FROM_RDF).as_matrix().tolist(),
-    }
 
 
 class PageStation:
@@ -107,7 +95,7 @@ class PageStation:
             "version": "0",
             "source": "rtp://127.0.0.1:5004",
             "demo": False,
-            "camera": camera_json(self.camera),
+            "camera": camera_table(self.camera),
             "trackers": self.trackers,
             "hold_s": 1.0,
             "ease_s": 2.0,

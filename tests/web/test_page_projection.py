@@ -18,6 +18,7 @@ from freelook.lens import (
     Perspective,
     Polynomial,
     Stereographic,
+    ThinPrismFisheye,
 )
 from freelook.rotations import RDF_FROM_FRD, body_from_view
 from freelook.types import ColorSpace, Matrix, Picture, Plane
@@ -38,6 +39,12 @@ CAMERAS = {
     "polynomial": make_camera(SIZE, Polynomial(a=150.0, b=2.0, c=-6.0), field_deg=188),
     "kannala_brandt": make_camera(
         SIZE, KannalaBrandt(f=140.0, k1=-0.01, k2=0.004, k3=-0.001), field_deg=210
+    ),
+    "not round": make_camera(
+        SIZE,
+        ThinPrismFisheye(f=140.0, k1=-0.01, p1=4e-3, p2=-2e-3, sx1=-3e-3, sy1=2e-3),
+        field_deg=200,
+        stretch=np.array([[1.0, 0.01], [0.0, 0.98]]),
     ),
     "off-centre, stretched, tilted": make_camera(
         SIZE,

@@ -26,6 +26,8 @@ from .blank import black_of, check_fits, plane_scales
 # measured; multiples of the node spacings, so that no node is computed twice
 BAND_ROWS = (128, 144, 112, 96)
 
+ROUND = np.empty((0, 0, 2), np.float32)  # the offset grid of a round lens
+
 FloatMap = NDArray[np.float32]
 _Band = Callable[[int, int, "_Scratch"], None]
 _Constants = tuple[Any, ...]
@@ -137,6 +139,8 @@ def _constants(camera: Camera, viewport: Viewport) -> _Constants:
         np.float32(camera.table.t_max),
         np.asarray(camera.center, dtype=np.float32),
         np.asarray(camera.stretch, dtype=np.float32),
+        camera.grid.offsets if camera.grid else ROUND,
+        np.float32(camera.grid.p_max if camera.grid else 1.0),
     )
 
 

@@ -26,13 +26,16 @@ def fill_band(
     t_max: Any,
     center: F32,
     stretch: F32,
+    offsets: F32,
+    p_max: Any,
     luma: F32,
     chroma: F32,
 ) -> bool:
     """Coordinates for a band of a view of `size` (width, height) that starts at `first_row`.
 
     luma (3, rows, columns) gets where each pixel looks, x and y in pixels of the picture, and
-    its t; chroma the same for planes half as large, in their pixels; chroma may be empty. t is
+    its t; chroma the same for planes half as large, in their pixels; chroma may be empty. offsets
+    (n, n, 2) is the grid of a lens that is not round, and empty for others. t is
     left alone unless the return value is true: then the rim of the field is in the band.
 
     The exact projection is made at nodes 16 view pixels apart, or less where cubics between
@@ -42,9 +45,10 @@ def fill_band(
     rows = luma.shape[1]
     while True:
         nodes = np.empty((3, (rows - 1) // step + 4, (size[0] - 1) // step + 4), np.float32)
-        project_nodes(
-            nodes, first_row, step, size, focal_px, camera_from_view, g, t_max, center, stretch
-        )
+        project_nodes(nodes, first_row, step, size, focal_px, camera_from_view, g, t_max)
+        if len(offsets):
+            add_offsets(nodes, g, t_max, offsets, p_max)
+        place_nodes(nodes, center, stretch)
         told = nodes.shape[1] >= 5 and nodes.shape[2] >= 5  # fewer have no fourth difference
         if step == FINEST or (told and interpolation_error(nodes, t_max) <= TOLERANCE_PX):
             break
@@ -64,10 +68,8 @@ def project_nodes(
     camera_from_view: F32,
     g: F32,
     t_max: float,
-    center: F32,
-    stretch: F32,
 ) -> None:
-    """Fill nodes (3, rows, columns) with pixel x, pixel y and t.
+    """Fill nodes (3, rows, columns) with the round image's x and y, from the axis, and t.
 
     Node (j, i) stands at view pixel x = step * (i - 1), y = first_row + step * (j - 1): one
     ring of nodes more than the band, for cubic interpolation.
@@ -92,10 +94,44 @@ def project_nodes(
                 shrink = np.sqrt(far / t)
                 px, py, t = px * shrink, py * shrink, far
             gain = look_up(g, (np.sqrt(t) + t) * per_place)
-            px, py = px * gain, py * gain
-            nodes[0, row, column] = center[0] + stretch[0, 0] * px + stretch[0, 1] * py
-            nodes[1, row, column] = center[1] + stretch[1, 0] * px + stretch[1, 1] * py
+            nodes[0, row, column] = px * gain
+            nodes[1, row, column] = py * gain
             nodes[2, row, column] = t
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def add_offsets(nodes: F32, g: F32, t_max: float, offsets: F32, p_max: float) -> None:
+    """Add what is not round in a lens: `offsets` (n, n, 2) over [-p_max, p_max]^2.
+
+    Beyond the grid its last cells go on as they are, for the reason given at `look_up`.
+    """
+    f32 = np.float32
+    last = len(offsets) - 1
+    per_place = f32(len(g) - 1) / (np.sqrt(t_max) + t_max)
+    per_cell = f32(last) / (f32(2) * p_max)
+    for row in range(nodes.shape[1]):
+        for column in range(nodes.shape[2]):
+            t = nodes[2, row, column]
+            gain = look_up(g, (np.sqrt(t) + t) * per_place)
+            x = (nodes[0, row, column] / gain + p_max) * per_cell
+            y = (nodes[1, row, column] / gain + p_max) * per_cell
+            i = min(max(int(x), 0), last - 1)
+            j = min(max(int(y), 0), last - 1)
+            fx, fy = x - f32(i), y - f32(j)
+            for k in range(2):
+                top = offsets[j, i, k] * (1 - fx) + offsets[j, i + 1, k] * fx
+                below = offsets[j + 1, i, k] * (1 - fx) + offsets[j + 1, i + 1, k] * fx
+                nodes[k, row, column] += top * (1 - fy) + below * fy
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def place_nodes(nodes: F32, center: F32, stretch: F32) -> None:
+    """From pixels around the axis to pixels of the picture."""
+    for row in range(nodes.shape[1]):
+        for column in range(nodes.shape[2]):
+            x, y = nodes[0, row, column], nodes[1, row, column]
+            nodes[0, row, column] = center[0] + stretch[0, 0] * x + stretch[0, 1] * y
+            nodes[1, row, column] = center[1] + stretch[1, 0] * x + stretch[1, 1] * y
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True, inline="always")

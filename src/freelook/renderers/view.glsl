@@ -6,6 +6,7 @@
 //   #define NV12          Y in a one-channel, UV in a two-channel texture
 //                         (neither: one RGB texture)
 //   #define FISHEYE       the whole fisheye picture as it is, instead of the view
+//   #define BENT          the lens is not round: lens_offsets is used
 //   #define COORDINATES   instead of colour: picture x and y in pixels, t, alpha
 //
 // Pixels: (0, 0) is the middle of the top-left one. The projection is defined in camera.py.
@@ -23,6 +24,10 @@ uniform highp sampler2D lens_g;    // 256 x 1, float: g at equal steps of sqrt(t
 uniform float lens_t_max;
 uniform vec2 lens_center;
 uniform mat2 lens_stretch;
+#ifdef BENT
+uniform highp sampler2D lens_offsets;  // n x n, two floats: pixels to add before the stretch
+uniform float lens_p_max;              // it covers p from -lens_p_max to lens_p_max
+#endif
 #endif
 
 #if defined(PLANES) || defined(NV12)
@@ -93,6 +98,22 @@ float g_at(float t) {
     return mix(g_low, g_high, place - float(low));
 }
 
+vec2 offset_at(vec2 p) {
+#ifdef BENT
+    int last = textureSize(lens_offsets, 0).x - 1;
+    vec2 place = clamp((p / lens_p_max + 1.0) * (0.5 * float(last)), 0.0, float(last));
+    ivec2 low = min(ivec2(place), last - 1);
+    vec2 part = place - vec2(low);
+    vec2 top = mix(texelFetch(lens_offsets, low, 0).rg,
+                   texelFetch(lens_offsets, low + ivec2(1, 0), 0).rg, part.x);
+    vec2 below = mix(texelFetch(lens_offsets, low + ivec2(0, 1), 0).rg,
+                     texelFetch(lens_offsets, low + ivec2(1, 1), 0).rg, part.x);
+    return mix(top, below, part.y);
+#else
+    return vec2(0.0);
+#endif
+}
+
 void main() {
     vec2 here = pixel_from_fragment.xy * gl_FragCoord.xy + pixel_from_fragment.zw;
     vec3 ray = camera_from_view * vec3((here - view_center) / view_focal_px, 1.0);
@@ -100,7 +121,7 @@ void main() {
     float depth = max(size + ray.z, 1e-5 * size);  // 0 straight behind, where no lens sees
     vec2 p = ray.xy / depth;
     float t = ray.z > 0.0 ? dot(p, p) : (size - ray.z) / depth;  // the same; each where exact
-    vec2 pixel = lens_center + lens_stretch * (p * g_at(t));
+    vec2 pixel = lens_center + lens_stretch * (p * g_at(t) + offset_at(p));
     float alpha = clamp((lens_t_max - t) / max(fwidth(t), 1e-12) + 0.5, 0.0, 1.0) * inside(pixel);
 #ifdef COORDINATES
     fragment = vec4(pixel, t, alpha);

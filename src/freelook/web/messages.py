@@ -88,7 +88,19 @@ def camera_table(camera: Camera) -> dict[str, Any]:
         "stretch": camera.stretch.tolist(),
         "t_max": camera.table.t_max,
         "g": [float(value) for value in camera.table.g],
+        "offsets": _offsets(camera),
         "camera_from_head": camera_from_head(camera).as_matrix().tolist(),
+    }
+
+
+def _offsets(camera: Camera) -> dict[str, Any] | None:
+    """The grid of a lens that is not round: rows of x, y pairs, one number after the other."""
+    if camera.grid is None:
+        return None
+    return {
+        "p_max": camera.grid.p_max,
+        "size": len(camera.grid.offsets),
+        "values": [round(float(value), 5) for value in camera.grid.offsets.ravel()],
     }
 
 

@@ -7,8 +7,10 @@ import { rgbFromYuv } from './colour.js';
 /** @typedef {{width: number, height: number, channels: 1 | 2, stride: number, bytes: Uint8Array}} Plane
  * stride in bytes */
 
-/** Texture units: planes or RGB, and the lens table. */
+/** Texture units behind those of the planes or RGB: the lens's table and grid, what is drawn into. */
 export const LENS_UNIT = 3;
+export const OFFSETS_UNIT = 4;
+export const TARGET_UNIT = 5;
 
 export class Picture {
   /** @param {WebGL2RenderingContext} gl */

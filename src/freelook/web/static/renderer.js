@@ -1,6 +1,6 @@
 // Draws views and whole fisheye pictures with WebGL2, on the canvas or into memory.
 
-import { LENS_UNIT, Picture, makeTexture } from './picture.js';
+import { LENS_UNIT, OFFSETS_UNIT, Picture, TARGET_UNIT, makeTexture } from './picture.js';
 import { Pen } from './pen.js';
 import { matrix, matrixProduct } from './quaternion.js';
 import { Shaders } from './shader.js';
@@ -29,6 +29,11 @@ export class Renderer {
     this.shaders = new Shaders(gl, shaderBody);
     this.lens = makeTexture(gl, LENS_UNIT, gl.NEAREST);
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.R32F, profile.g.length, 1, 0, gl.RED, gl.FLOAT, profile.g);
+    this.offsets = profile.offsets && makeTexture(gl, OFFSETS_UNIT, gl.NEAREST);
+    if (profile.offsets) {
+      const { size, values } = profile.offsets;
+      gl.texImage2D(gl.TEXTURE_2D, 0, gl.RG32F, size, size, 0, gl.RG, gl.FLOAT, values);
+    }
     this.pen = new Pen(gl);
     this.noAttributes = gl.createVertexArray();
   }
@@ -106,7 +111,7 @@ export class Renderer {
    * @param {string[]} defines */
   drawInto(store, view, headFromView, defines) {
     const { gl } = this;
-    this.target = { frame: gl.createFramebuffer(), texture: makeTexture(gl, LENS_UNIT + 1, gl.NEAREST) };
+    this.target = { frame: gl.createFramebuffer(), texture: makeTexture(gl, TARGET_UNIT, gl.NEAREST) };
     gl.texStorage2D(gl.TEXTURE_2D, 1, store, view.width, view.height);
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.target.frame);
     const { texture } = this.target;
@@ -129,7 +134,8 @@ export class Renderer {
 
   /** @param {string[]} defines */
   begin(defines) {
-    const program = this.shaders.use([...this.picture.defines, ...defines]);
+    const bent = this.offsets ? ['BENT'] : [];
+    const program = this.shaders.use([...this.picture.defines, ...bent, ...defines]);
     this.gl.bindVertexArray(this.noAttributes);
     this.picture.bind(program);
     this.gl.uniform1f(program.at('grey'), this.grey);
@@ -161,6 +167,11 @@ export class Renderer {
     gl.uniform1f(program.at('lens_t_max'), camera.tMax);
     gl.uniform2fv(program.at('lens_center'), camera.center);
     gl.uniformMatrix2fv(program.at('lens_stretch'), true, camera.stretch.flat());
+    if (!camera.offsets) return;
+    gl.activeTexture(gl.TEXTURE0 + OFFSETS_UNIT);
+    gl.bindTexture(gl.TEXTURE_2D, this.offsets);
+    gl.uniform1i(program.at('lens_offsets'), OFFSETS_UNIT);
+    gl.uniform1f(program.at('lens_p_max'), camera.offsets.pMax);
   }
 }
 
