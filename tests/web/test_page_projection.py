@@ -86,6 +86,17 @@ def test_coordinates_are_those_of_the_exact_projection(name: str, open_page) -> 
     assert any((~np.isnan(exact_pixels(camera, head, VIEW))).any() for head in HEADS)
 
 
+@pytest.mark.parametrize("name", ["off-centre, stretched, tilted", "not round"])
+def test_outlines_use_the_same_projection(name: str, open_page) -> None:  # type: ignore[no-untyped-def]
+    """The page draws the view's outline over the whole picture without the shader."""
+    camera = CAMERAS[name]
+    page = open_page(camera)
+    rays = [[0.1, -0.2, 1.0], [-2.0, 0.5, 0.3], [1.0, 1.0, -0.1], [0.0, 0.0, -1.0]]
+    script = "rays => rays.map(ray => window.freelook.app.renderer.camera.project(ray))"
+    pixels = [[np.nan] * 2 if at is None else at for at in page.page.evaluate(script, rays)]
+    np.testing.assert_allclose(pixels, camera.project(np.array(rays)), atol=0.01)
+
+
 def test_rays_beyond_90_degrees_are_drawn(open_page) -> None:  # type: ignore[no-untyped-def]
     camera = CAMERAS["stereographic"]
     page = open_page(camera)
