@@ -1,0 +1,1 @@
+"""Figures. Everything here needs the extra `plot`; nothing here opens a window."""
