@@ -22,8 +22,12 @@ from .base import (
     with_vector,
 )
 from .classical import Equidistant, Equisolid, Orthographic, Perspective, Stereographic
-from .polynomial import KannalaBrandt, Polynomial
-from .prism import ThinPrismFisheye
+from .measured import OCamCalib, RadialSpline
+from .polynomial import KannalaBrandt, KannalaBrandt9, Polynomial, Sony
+from .prism import RadTanThinPrismFisheye, ThinPrismFisheye
+from .rectilinear import FieldOfView, OpenCVRational, Poly3, Poly5, PTLens
+from .sphere import DoubleSphere, ExtendedUnified, Mei
+from .splined import SplinedStereographic
 
 MODELS: dict[str, type[Lens]] = {
     "perspective": Perspective,
@@ -33,7 +37,21 @@ MODELS: dict[str, type[Lens]] = {
     "orthographic": Orthographic,
     "polynomial": Polynomial,
     "kannala_brandt": KannalaBrandt,
+    "kannala_brandt_9": KannalaBrandt9,
+    "sony": Sony,
+    "double_sphere": DoubleSphere,
+    "eucm": ExtendedUnified,
+    "mei": Mei,
+    "ocamcalib": OCamCalib,
+    "fov": FieldOfView,
+    "poly3": Poly3,
+    "poly5": Poly5,
+    "ptlens": PTLens,
+    "opencv_rational": OpenCVRational,
     "thin_prism_fisheye": ThinPrismFisheye,
+    "rad_tan_thin_prism_fisheye": RadTanThinPrismFisheye,
+    "radial_spline": RadialSpline,
+    "splined_stereographic": SplinedStereographic,
 }
 
 
@@ -46,14 +64,28 @@ __all__ = [
     "FIXED",
     "MODELS",
     "BentLens",
+    "DoubleSphere",
     "Equidistant",
     "Equisolid",
+    "ExtendedUnified",
+    "FieldOfView",
     "Floats",
     "KannalaBrandt",
+    "KannalaBrandt9",
     "Lens",
+    "Mei",
+    "OCamCalib",
+    "OpenCVRational",
     "Orthographic",
+    "PTLens",
     "Perspective",
+    "Poly3",
+    "Poly5",
     "Polynomial",
+    "RadTanThinPrismFisheye",
+    "RadialSpline",
+    "Sony",
+    "SplinedStereographic",
     "Stereographic",
     "ThinPrismFisheye",
     "angle_at_radius",

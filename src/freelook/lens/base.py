@@ -94,19 +94,25 @@ def radius_slope(lens: Lens, theta: Floats) -> Floats:
 def growth_limit(lens: Lens, up_to: float | None = None) -> float:
     """The angle in radians, at most `up_to` or the hard limit, where r(theta) stops growing.
 
-    Found on a grid of 0.01 degree and then bisected. 0.0 if the radius does not grow at all.
+    Found on a grid of 0.01 degree and then bisected. 0.0 if the radius does not grow at all, or
+    is no number: impossible parameters are found here.
     """
     end = min(lens.hard_limit, up_to) if up_to is not None else lens.hard_limit
+    if not end > 0:
+        return 0.0
     theta = np.linspace(0.0, np.nextafter(end, 0.0), max(2, int(np.degrees(end) * 100)))
-    falls = np.diff(lens.radius(theta)) <= 0
-    if not falls.any():
-        return float(end)
-    first = int(np.argmax(falls))
-    low, high = theta[max(first - 1, 0)], theta[first + 1]
-    for _ in range(40):
-        middle = (low + high) / 2
-        slope = radius_slope(lens, np.array([middle]))[0]
-        low, high = (middle, high) if slope > 0 else (low, middle)
+    with np.errstate(all="ignore"):
+        grows = np.diff(lens.radius(theta)) > 0
+        if grows.all():
+            return float(end)
+        first = int(np.argmin(grows))
+        low, high = theta[max(first - 1, 0)], theta[first + 1]
+        start = lens.radius(np.array([low]))[0]
+        for _ in range(40):
+            middle = np.array([(low + high) / 2])
+            # behind a pole it grows too, but from below
+            further = radius_slope(lens, middle)[0] > 0 and lens.radius(middle)[0] >= start
+            low, high = (middle[0], high) if further else (low, middle[0])
     return float(low) if low > 1e-9 else 0.0
 
 
