@@ -15,7 +15,8 @@ LAYERS: list[set[str]] = [
     {"types", "errors", "clock"},
     {"lens", "camera", "viewport", "rotations", "mailbox", "axes", "pose_script"}
     | {"color", "datagrams", "latency", "plugins"},
-    {"renderers", "gimbal", "simulation", "media", "plots", "resolution", "comparison"},
+    {"renderers", "gimbal", "simulation", "media", "plots"}
+    | {"resolution", "view_cost", "comparison"},
     {"sources", "trackers", "sinks", "formats"},
     {"ingest", "head", "session", "offline"},
     {"cli", "web", "bench", "doctor", "egl"},
