@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import threading
 from collections import deque
 from collections.abc import Iterator, Mapping
@@ -136,7 +137,8 @@ class DeviceSource:
 def _open_device(path: str, chosen: Mapping[str, str]) -> InputContainer:
     options = {_OPTIONS[name]: value for name, value in chosen.items() if name in _OPTIONS}
     try:
-        return av.open(path, format=KIND, options=options)
+        # not `options`: those go to the decoder too, which would believe the size asked for
+        return av.open(path, format=KIND, container_options=options)
     except FileNotFoundError:
         there = ", ".join(devices()) or "none"
         raise SourceError(
@@ -146,9 +148,17 @@ def _open_device(path: str, chosen: Mapping[str, str]) -> InputContainer:
         raise SourceError(
             f"{path}: no permission; add yourself to the group 'video' and log in again"
         ) from None
-    except (FFmpegError, OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        wanted = ", ".join(f"{name}={value}" for name, value in chosen.items())
-        raise SourceError(
-            f"{path}: {reason}" + (f" (asked for {wanted})" if wanted else ""), retry=not wanted
-        ) from None
+    except OSError as error:  # FFmpeg's errors of the system are these too
+        if error.errno != errno.EBUSY:
+            raise _refused(path, chosen, error) from None
+        # it may be ours: the driver's read holds a device for one more picture after `close`
+        raise SourceError(f"{path}: in use by another program", retry=True) from None
+    except (FFmpegError, ValueError) as error:
+        raise _refused(path, chosen, error) from None
+
+
+def _refused(path: str, chosen: Mapping[str, str], error: Exception) -> SourceError:
+    reason = getattr(error, "strerror", None) or error
+    wanted = ", ".join(f"{name}={value}" for name, value in chosen.items())
+    asked = f" (asked for {wanted})" if wanted else ""
+    return SourceError(f"{path}: {reason}{asked}", retry=not wanted)
