@@ -25,6 +25,12 @@ MOUNT_HELP = (
 def add_lens_arguments(parser: argparse.ArgumentParser) -> None:
     """--lens and what goes with it; `lens_profile` and `mounted_camera` read them."""
     parser.add_argument("--lens", metavar="PROFILE", help=LENS_HELP)
+    add_format_arguments(parser)
+    parser.add_argument("--mount", type=three_angles, metavar="YAW,PITCH,ROLL", help=MOUNT_HELP)
+
+
+def add_format_arguments(parser: argparse.ArgumentParser) -> None:
+    """How a profile is read; for commands that take it by its name alone."""
     parser.add_argument(
         "--lens-format", choices=FORMATS, metavar="FORMAT", help="if it is not recognised rightly"
     )
@@ -34,7 +40,6 @@ def add_lens_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="WxH",
         help="picture size the profile is for, where it does not say so itself",
     )
-    parser.add_argument("--mount", type=three_angles, metavar="YAW,PITCH,ROLL", help=MOUNT_HELP)
 
 
 def lens_profile(args: argparse.Namespace, name: str) -> Profile:
