@@ -15,7 +15,7 @@ LAYERS: list[set[str]] = [
     {"types", "errors", "clock"},
     {"lens", "camera", "viewport", "rotations", "mailbox", "axes", "pose_script"}
     | {"color", "datagrams", "latency", "plugins"},
-    {"renderers", "gimbal", "simulation", "media", "plots"}
+    {"renderers", "gimbal", "simulation", "media", "fitting", "plots"}
     | {"resolution", "view_cost", "comparison"},
     {"sources", "trackers", "sinks", "formats"},
     {"ingest", "head", "session", "offline"},

@@ -2,6 +2,7 @@
 
     FreelookError
     ├── ProfileError      a lens profile that is wrong; says where
+    ├── FitError          measurements that no such lens can be fitted to
     ├── SourceError       video that cannot be opened or read
     ├── TrackerError      a head tracker that cannot be opened
     ├── RenderError       a picture or a view that cannot be rendered
@@ -19,6 +20,10 @@ class FreelookError(Exception):
 
 class ProfileError(FreelookError):
     """A lens profile that cannot be used as it is."""
+
+
+class FitError(FreelookError):
+    """Measurements, or a camera, that the asked lens model cannot be fitted to."""
 
 
 class SourceError(FreelookError):

@@ -1,0 +1,230 @@
+"""Non-linear least squares as the fits here need it: scaled, robust, with its covariance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from ..errors import FitError
+from ..lens import Floats
+
+Function = Callable[[Floats], Floats]
+
+# Residuals of this many standard deviations are where a robust loss begins to differ from least
+# squares: soft_l1 then keeps about 95 % of the efficiency on normal noise.
+TURN = 1.5
+ROUGH, CLOSE = 1e-4, 1e-13  # where to stop, relative
+LOSSES = ("linear", "soft_l1", "cauchy")
+
+
+@dataclass(frozen=True)
+class Minimum:
+    """Where the least squares ended.
+
+    x         (p,) the parameters
+    values    (n,) the residuals of the data there
+    jacobian  (n, p) d values / d x
+    step      (p,) changes of the parameters small enough for such differences
+    loss      a name of `LOSSES`
+    scale     the residual where the loss turns from square to robust
+    forced    whether the constraints pushed against the data
+    """
+
+    x: Floats
+    values: Floats
+    jacobian: Floats
+    step: Floats
+    loss: str
+    scale: float
+    forced: bool
+
+    @property
+    def rank(self) -> int:
+        """How many combinations of parameters the data determine."""
+        return len(self._determined[0])
+
+    @property
+    def undetermined(self) -> Floats:
+        """(p,) bool: parameters that can change, others with them, without changing the fit."""
+        _, axes, _ = self._determined
+        return np.asarray(np.sum(axes**2, axis=0) < 1 - 1e-6)
+
+    @cached_property
+    def covariance(self) -> Floats:
+        """(p, p): (J^T J)^-1 times the residual variance, of what the data determine.
+
+        For a robust loss the variance is E psi^2 / (E psi')^2 (Huber, Robust Statistics, 1981,
+        section 7.6). NaN where there are no more residuals than parameters.
+        """
+        singular, axes, size = self._determined
+        half = axes / singular[:, None] / size
+        return np.asarray(half.T @ half * self._variance)
+
+    @cached_property
+    def _determined(self) -> tuple[Floats, Floats, Floats]:
+        """Singular values above nothing of J / size, their axes (rank, p), and size (p,)."""
+        size = np.linalg.norm(self.jacobian, axis=0)
+        size = np.where(size > 0, size, 1.0)
+        _, singular, axes = np.linalg.svd(self.jacobian / size, full_matrices=False)
+        kept = singular > 1e-9 * singular.max(initial=1e-300)
+        return singular[kept], axes[kept], size
+
+    @property
+    def _variance(self) -> float:
+        freedom = len(self.values) - self.rank
+        if freedom <= 0:
+            return float("nan")
+        _, slope, curvature = _loss(self.loss, (self.values / self.scale) ** 2)
+        flat = np.mean(slope + 2 * (self.values / self.scale) ** 2 * curvature)
+        return float(np.sum((self.values * slope) ** 2) / freedom / flat**2)
+
+
+def minimise(
+    values: Function,
+    start: Floats,
+    *,
+    size: float,
+    loss: str = "linear",
+    scale: float | None = None,
+    constraints: Function | None = None,
+    rough: bool = False,
+) -> Minimum:
+    """The parameters that make `values` smallest, from `start` on.
+
+    values       parameters (p,) to residuals (n,); NaN where parameters make no sense
+    size         how large the fitted quantity is, in the residuals' unit: steps and the
+                 smallest noise believed (1e-9 of it) follow from it
+    loss         "linear" for least squares, "soft_l1" or "cauchy" against outliers
+    scale        where the loss turns; None: 1.5 robust standard deviations of the residuals,
+                 found along the way
+    rough        only near enough to tell which of several valleys is the deepest
+    constraints  parameters to values that should be 0; plain squares, whatever the loss
+
+    FitError when the start makes no sense or the loss is unknown.
+    """
+    if loss not in LOSSES:
+        raise FitError(f"unknown loss '{loss}'; known: {', '.join(LOSSES)}")
+    problem = _Problem(values, constraints, np.asarray(start, dtype=float), size)
+    tolerance = ROUGH if rough else CLOSE
+    if loss == "linear":
+        return problem.minimum(problem.solve(problem.start, loss, 1.0, tolerance), loss, 1.0)
+    x, turn = problem.start, scale or problem.turn(problem.start)
+    for _ in range(2 if rough else 12 if scale is None else 0):
+        x = problem.solve(x, loss, turn, ROUGH)
+        last, turn = turn, problem.turn(x)
+        if abs(turn - last) <= 0.02 * last:
+            break
+    return problem.minimum(problem.solve(x, loss, turn, tolerance), loss, turn)
+
+
+def spread(values: Floats, parameters: int = 0) -> float:
+    """The standard deviation of most residuals, whatever the others do, after a fit.
+
+    1.4826 times the median size; the residuals that a fit of so many parameters makes 0 do not
+    count.
+    """
+    ordered = np.sort(np.abs(values))[min(parameters, len(values) - 1) :]
+    return float(1.4826 * np.median(ordered))
+
+
+def _loss(name: str, z: Floats) -> tuple[Floats, Floats, Floats]:
+    """rho(z) of squared residuals z, with its two derivatives."""
+    if name == "soft_l1":
+        root = np.sqrt(1 + z)
+        return 2 * (root - 1), 1 / root, -0.5 / root**3
+    if name == "cauchy":
+        return np.log1p(z), 1 / (1 + z), -1 / (1 + z) ** 2
+    return z, np.ones_like(z), np.zeros_like(z)
+
+
+class _Problem:
+    """The least squares in units in which every parameter moves the data alike."""
+
+    def __init__(
+        self, values: Function, constraints: Function | None, start: Floats, size: float
+    ) -> None:
+        self._values, self._constraints = values, constraints
+        self.start, self._size = start, size
+        self._count = len(self.values(start))
+        if not np.isfinite(self.values(start)).all():
+            raise FitError(f"the start {start.tolist()} of the fit makes no sense")
+        self._unit = np.array([self._step(j) for j in range(len(start))])
+
+    def values(self, x: Floats) -> Floats:
+        with np.errstate(all="ignore"):
+            return np.asarray(self._values(x), dtype=float)
+
+    def turn(self, x: Floats) -> float:
+        """Where a robust loss turns, by the residuals there."""
+        return max(1e-9 * self._size, TURN * spread(self.values(x), len(x)))
+
+    def solve(self, x: Floats, loss: str, turn: float, tolerance: float) -> Floats:
+        def rho(z: Floats) -> Floats:
+            terms = np.stack(_loss(loss, z))
+            plain = z[self._count :]
+            terms[:, self._count :] = np.stack([plain, np.ones_like(plain), 0 * plain])
+            return terms
+
+        with np.errstate(under="ignore"):
+            found = least_squares(
+                lambda y: self._rows(x + y * self._unit) / turn,
+                np.zeros_like(x),
+                jac=lambda y: self._jacobian(x + y * self._unit) / turn,
+                x_scale="jac",
+                loss=rho if loss != "linear" else "linear",
+                ftol=tolerance,
+                xtol=tolerance,
+                gtol=1e-15,
+                max_nfev=20 if tolerance == ROUGH else 200,
+            )
+        return np.asarray(x + found.x * self._unit)
+
+    def minimum(self, x: Floats, loss: str, turn: float) -> Minimum:
+        jacobian = self._jacobian(x)[: self._count] / self._unit
+        held = self._rows(x)[self._count :]
+        forced = bool((np.abs(held) > 1e-9 * self._size).any())
+        return Minimum(x, self.values(x), jacobian, self._unit, loss, turn, forced)
+
+    def _rows(self, x: Floats) -> Floats:
+        """Data, then constraints; something large where the parameters make no sense."""
+        rows = self.values(x)
+        if self._constraints is not None:
+            with np.errstate(all="ignore"):
+                rows = np.concatenate([rows, self._constraints(x)])
+        limit = 1e6 * self._size
+        return np.clip(np.nan_to_num(rows, nan=limit, posinf=limit, neginf=-limit), -limit, limit)
+
+    def _jacobian(self, x: Floats) -> Floats:
+        """d rows / d y, by central differences; one-sided where one side makes no sense."""
+        columns = []
+        for unit in np.diag(self._unit):
+            ahead = unit if np.isfinite(self.values(x + unit)).all() else 0 * unit
+            behind = unit if np.isfinite(self.values(x - unit)).all() else 0 * unit
+            steps = max(1, int(ahead.any()) + int(behind.any()))
+            columns.append((self._rows(x + ahead) - self._rows(x - behind)) / steps)
+        return np.stack(columns, axis=-1)
+
+    def _step(self, j: int) -> float:
+        """The change of parameter j that moves the data by 1e-4 of their size, about.
+
+        Central differences then err by about 1e-8 of a slope, rounding by 1e-11.
+        """
+        here, wanted = self.values(self.start), 1e-4 * self._size
+        step, largest = 1e-3, 1e9
+        for _ in range(40):
+            moved = self.values(self.start + step * np.eye(len(self.start))[j]) - here
+            if not np.isfinite(moved).all():
+                largest = step
+                step *= 0.1
+                continue
+            change = float(np.sqrt(np.mean(moved**2)))
+            if wanted / 3 < change < 3 * wanted:
+                break
+            step = min(step * float(np.clip(wanted / max(change, 1e-30), 1e-4, 1e3)), largest / 3)
+            if step > 1e6:  # it moves nothing
+                return 1.0
+        return step

@@ -1,0 +1,131 @@
+"""What a fit has to know about lens models: which can be started from what, and where they end."""
+
+from __future__ import annotations
+
+from dataclasses import MISSING, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FitError, ProfileError
+from ..lens import MODELS, Floats, Lens, RadialSpline, growth_limit, vector, with_vector
+
+# The slope that a fitted radius keeps at least, as a share of its mean slope.
+LEAST_SLOPE = 1e-3
+CELLS = 90
+
+Bools = NDArray[np.bool_]
+
+
+def known_model(name: str) -> type[Lens]:
+    """The class of a model; FitError that lists those there are."""
+    if name not in MODELS:
+        raise FitError(f"unknown lens model '{name}'; known: {', '.join(MODELS)}")
+    return MODELS[name]
+
+
+def default_lens(name: str, theta_max: float, knots: int) -> Lens:
+    """A lens of a model with scale 1 and everything else at its default.
+
+    A radial spline gets so many knots at equal steps to theta_max (radians). FitError for a model
+    that has neither.
+    """
+    model = known_model(name)
+    if model is RadialSpline:
+        angles = np.linspace(0, theta_max, knots + 1)[1:]
+        return RadialSpline(tuple(map(float, np.degrees(angles))), tuple(map(float, angles)))
+    if sum(f.default is MISSING for f in fields(model)) > 1:  # type: ignore[arg-type]
+        raise FitError(f"{name} has no lens to start a fit from")
+    return model(1.0)  # type: ignore[call-arg]
+
+
+def scaled(lens: Lens, factor: float) -> Lens | None:
+    """The lens with all radii so many times as large."""
+    x = vector(lens)
+    x[slice(None) if isinstance(lens, RadialSpline) else slice(1)] *= factor
+    return lens_with(lens, x)
+
+
+def radius_of(lens: Lens, theta: Floats) -> Floats:
+    """`lens.radius`, going on evenly beyond the angle where the formula ends.
+
+    So a fit whose parameters pass through lenses that end early finds its way back.
+    """
+    end = min(lens.hard_limit, np.pi) * (1 - 1e-9)
+    inside = np.minimum(theta, end)
+    return np.asarray(lens.radius(inside) * (1 + theta - inside))
+
+
+def lens_with(lens: Lens, x: Floats) -> Lens | None:
+    """The lens with another vector, or None where there is no such lens."""
+    try:
+        changed = with_vector(lens, x)
+        return changed if changed.hard_limit > 0 else None
+    except (ProfileError, ValueError, ArithmeticError):
+        return None
+
+
+def slope_shortfall(lens: Lens, theta_max: float, least: float = LEAST_SLOPE) -> Floats:
+    """How much slower than `least` (of its mean) the radius grows, in each of 90 cells; 0 is good.
+
+    In shares of the mean slope.
+    """
+    radius = radius_of(lens, np.linspace(0, theta_max, CELLS + 1))
+    mean = abs(radius[-1]) + 1e-9 * np.abs(radius).max() + 1e-300
+    return np.asarray(np.maximum(0.0, least - np.diff(radius) / mean * CELLS))
+
+
+def grows(lens: Lens, theta_max: float) -> bool:
+    """Whether the lens is good for all angles up to theta_max (radians)."""
+    return growth_end(lens, theta_max) >= theta_max * (1 - 1e-6)
+
+
+def growth_end(lens: Lens, theta_max: float) -> float:
+    """`growth_limit` up to theta_max, for any lens that a fit may come up with; 0 for nonsense."""
+    if lens.hard_limit <= 0:
+        return 0.0
+    with np.errstate(all="ignore"):
+        limit = growth_limit(lens, theta_max)
+        ends = lens.radius(np.array([0.0, limit]))
+    return limit if np.isfinite(ends).all() else 0.0
+
+
+def check_growth(lens: Lens, theta_max: float, model: str) -> None:
+    """FitError if a fitted lens ends, or stops growing, before theta_max (radians)."""
+    if grows(lens, theta_max):
+        return
+    end, last = np.degrees(growth_end(lens, theta_max)), np.degrees(theta_max)
+    always = isinstance(getattr(type(lens), "hard_limit", None), float)
+    if lens.hard_limit < theta_max and always:
+        raise FitError(
+            f"a {model} lens ends at {np.degrees(lens.hard_limit):.0f} degrees from the axis; "
+            f"the data go to {last:.2f}"
+        )
+    raise FitError(
+        f"the {model} lens that comes nearest ends or stops growing at {end:.2f} degrees from "
+        f"the axis; the data go to {last:.2f}"
+    )
+
+
+def round_parameters(lens: Lens, theta: Floats) -> Bools:
+    """(p,) bool: which entries of `vector(lens)` the radius depends on."""
+    x = vector(lens)
+    with np.errstate(all="ignore"):
+        here = radius_of(lens, theta)
+        moved = []
+        for step in np.diag(1e-3 + 1e-3 * np.abs(x)):
+            other = lens_with(lens, x + step)
+            moved.append(other is None or not np.array_equal(radius_of(other, theta), here))
+    return np.array(moved)
+
+
+def free_names(lens: Lens) -> list[str]:
+    """A name for every entry of `vector(lens)`; those of lists are numbered: `knots_px[0]`."""
+    names: list[str] = []
+    for item in fields(lens):  # type: ignore[arg-type]
+        value = getattr(lens, item.name)
+        if item.metadata.get("fixed"):
+            continue
+        many = isinstance(value, tuple)
+        names += [f"{item.name}[{i}]" for i in range(len(value))] if many else [item.name]
+    return names

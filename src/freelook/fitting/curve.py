@@ -1,0 +1,232 @@
+"""A lens's curve from measured angles and radii, with what is known about its uncertainty."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from ..errors import FitError
+from ..lens import MODELS, Floats, Lens
+from ._curve_data import CurveProblem, checked
+from ._minimum import Minimum, spread
+from ._models import LEAST_SLOPE, check_growth, grows, known_model, radius_of
+from ._scores import aic, aicc, bic
+from ._starts import starting_curves
+
+# With more points than this, ten groups are left out in turn instead of single points.
+MOST_SINGLE = 40
+
+
+# Models that say nothing new about a curve: a surface, and one whose round part is another model.
+NOT_CURVES = {
+    "splined_stereographic": "it is a surface of corrections: take radial_spline",
+    "thin_prism_fisheye": "its round part is kannala_brandt: take that",
+}
+
+
+def curve_models() -> list[str]:
+    """Names of the models that can be fitted to a curve."""
+    return [name for name in MODELS if name not in NOT_CURVES]
+
+
+@dataclass(frozen=True)
+class CurveFit:
+    """A lens fitted to p(theta) = offset + r(theta).
+
+    model         its name in `MODELS`
+    lens          the lens; parameters that do not change its radius are at their defaults
+    offset_px     where the axis is on the scale of the measured positions; 0 if not asked for
+    names         the fitted parameters, `offset_px` last if it is one of them; those of lists
+                  are numbered, as in coefficients[0]
+    covariance    (p, p) of those; the size of the noise is taken from the residuals
+    undetermined  those among them that the data do not determine
+    residuals_px  (n,) measured minus fitted, in the order given
+    theta_max     the largest angle measured, radians
+    forced        the data alone would want a radius that stops growing, and it was kept growing:
+                  the parameters' uncertainty means little then
+    """
+
+    model: str
+    lens: Lens
+    offset_px: float
+    names: tuple[str, ...]
+    covariance: Floats
+    undetermined: tuple[str, ...]
+    residuals_px: Floats
+    theta_max: float
+    forced: bool
+    _problem: CurveProblem = field(repr=False)
+    _minimum: Minimum = field(repr=False)
+
+    @property
+    def rms_px(self) -> float:
+        return float(np.sqrt(np.mean(self.residuals_px**2)))
+
+    @property
+    def noise_px(self) -> float:
+        """The standard deviation of most residuals; outliers do not count."""
+        return spread(self.residuals_px, len(self.names))
+
+    @property
+    def aic(self) -> float:
+        return aic(self._log_likelihood, self._k)
+
+    @property
+    def aicc(self) -> float:
+        """AIC corrected for few points: what `rank` goes by."""
+        return aicc(self._log_likelihood, self._k, len(self.residuals_px))
+
+    @property
+    def bic(self) -> float:
+        return bic(self._log_likelihood, self._k, len(self.residuals_px))
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The fitted parameters by name."""
+        return dict(zip(self.names, map(float, self._minimum.x), strict=True))
+
+    @property
+    def sigma(self) -> dict[str, float]:
+        """Their standard deviations; infinite where the data do not determine one."""
+        sigma = np.sqrt(np.diag(self.covariance))
+        return {
+            name: float("inf") if name in self.undetermined else float(value)
+            for name, value in zip(self.names, sigma, strict=True)
+        }
+
+    def __call__(self, theta: Floats) -> Floats:
+        """The fitted position at angles in radians (negative: the other side), pixels."""
+        theta = np.asarray(theta, dtype=float)
+        return np.asarray(self.offset_px + radius_of(self.lens, np.abs(theta)) * np.sign(theta))
+
+    def band(self, theta: Floats) -> Floats:
+        """Standard deviation of the fitted curve at angles in radians, pixels.
+
+        It follows from the covariance: right for a model that is right. It says nothing about
+        how wrong a wrong model is.
+        """
+        theta = np.asarray(theta, dtype=float)
+        x, steps = self._minimum.x, np.diag(self._minimum.step)
+        curve = self._problem.curve
+        ahead = np.stack([curve(x + step, theta) for step in steps], axis=-1)
+        behind = np.stack([curve(x - step, theta) for step in steps], axis=-1)
+        slopes = (ahead - behind) / (2 * self._minimum.step)
+        variance = np.einsum("...i,ij,...j->...", slopes, self.covariance, slopes)
+        return np.asarray(np.sqrt(np.maximum(variance, 0)))
+
+    @cached_property
+    def cv_residuals_px(self) -> Floats:
+        """(n,) how far each point is from a fit that has not seen it.
+
+        Up to 40 points are left out one by one, more in ten interleaved groups. Takes as many
+        fits.
+        """
+        data, n = self._problem.data, len(self.residuals_px)
+        order = np.argsort(np.abs(data.theta), kind="stable")
+        groups = n if n <= MOST_SINGLE else 10
+        residuals = np.empty(n)
+        for group in range(groups):
+            out = np.zeros(n, bool)
+            out[order[group::groups]] = True
+            seen = replace(self._problem, data=data.part(~out))
+            found = seen.fit(self._minimum.x, self.theta_max, scale=self._minimum.scale)
+            residuals[out] = replace(seen, data=data.part(out)).residuals_px(found.x)
+        return residuals
+
+    @property
+    def cv_rms_px(self) -> float:
+        """Root mean square of `cv_residuals_px`: how well unmeasured points are predicted."""
+        return float(np.sqrt(np.mean(self.cv_residuals_px**2)))
+
+    @property
+    def _k(self) -> int:
+        return self._minimum.rank + 1
+
+    @cached_property
+    def _log_likelihood(self) -> float:
+        return self._problem.log_likelihood(self._minimum)
+
+
+def fit_curve(
+    model: str,
+    theta: Floats,
+    radius_px: Floats,
+    *,
+    sigma_px: Floats | float | None = None,
+    free_offset: bool = False,
+    loss: str = "soft_l1",
+) -> CurveFit:
+    """The lens of a model that comes closest to measured radii.
+
+    theta        (n,) angles from the axis, radians; negative ones are the other side of the axis,
+                 where radii are negative too
+    radius_px    (n,) distances from the axis, pixels; with `free_offset` positions on any scale
+                 that grows with the angle
+    sigma_px     (n,) or one: how uncertain the radii are compared with each other; the size of
+                 the noise is always taken from the residuals
+    free_offset  seek the position of the axis too
+    loss         "soft_l1" or "cauchy" against outliers, "linear" for plain least squares
+
+    A lens whose radius does not grow all the way to the largest angle is never returned: the fit
+    is held to those that grow (`forced` tells), and FitError is raised where that does not help,
+    where the model ends before the data do, and for too few or impossible points.
+    """
+    known_model(model)
+    if model in NOT_CURVES:
+        raise FitError(f"{model} cannot be fitted to a curve; {NOT_CURVES[model]}")
+    data = checked(theta, radius_px, sigma_px, free_offset, loss)
+    starts = [
+        (CurveProblem.of(data, lens), offset) for lens, offset in starting_curves(model, data)
+    ]
+    p, n = len(starts[0][0].names), len(data.theta)
+    if n <= p:
+        raise FitError(f"{model} has {p} parameters here; it needs {p + 1} points, not {n}")
+    ends = [
+        (problem, problem.fit(problem.start(problem.like, offset), data.theta_max, rough=True))
+        for problem, offset in starts
+    ]
+    problem, found = max(ends, key=lambda end: end[0].log_likelihood(end[1]))
+    found = problem.fit(found.x, data.theta_max)
+    lens, found = _growing(model, problem, found)
+    return CurveFit(
+        model=model,
+        lens=lens,
+        offset_px=problem.offset_px(found.x),
+        names=problem.names,
+        covariance=found.covariance,
+        undetermined=tuple(n for n, u in zip(problem.names, found.undetermined, strict=True) if u),
+        residuals_px=problem.residuals_px(found.x),
+        theta_max=data.theta_max,
+        forced=found.forced,
+        _problem=problem,
+        _minimum=found,
+    )
+
+
+def rank(fits: Sequence[CurveFit]) -> list[CurveFit]:
+    """Best first, by AICc; they must be fits of the same points with the same loss.
+
+    Two whose AICc differ by less than 2 cannot be told apart by these data (Burnham and Anderson,
+    Model Selection and Multimodel Inference, 2002, section 2.6).
+    """
+    if len({(len(fit.residuals_px), fit._problem.data.loss) for fit in fits}) > 1:
+        raise FitError("only fits of the same points, with the same loss, can be ranked")
+    return sorted(fits, key=lambda fit: (fit.aicc, len(fit.names)))
+
+
+def _growing(model: str, problem: CurveProblem, found: Minimum) -> tuple[Lens, Minimum]:
+    """The lens of a minimum, from a steeper bound where it stops growing between the cells."""
+    theta_max = problem.data.theta_max
+    lens = problem.lens(found.x)
+    for least_slope in (5 * LEAST_SLOPE, 20 * LEAST_SLOPE):
+        if lens is None or grows(lens, theta_max):
+            break
+        found = problem.fit(found.x, theta_max, least_slope=least_slope)
+        lens = problem.lens(found.x)
+    if lens is None:
+        raise FitError(f"{model} does not fit these points: no lens comes near them")
+    check_growth(lens, theta_max, model)
+    return lens, found
