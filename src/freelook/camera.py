@@ -17,7 +17,7 @@ offsets over the square [-p_max, p_max]^2 of p, interpolated bilinearly. Most ca
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -93,7 +93,8 @@ class OffsetGrid:
 
     Entry [j, i] belongs to p = (-p_max + i step, -p_max + j step), step = 2 p_max / (n - 1).
     `residual_px` is the largest distance between grid and formula where the lens sees, measured
-    in the middle of every cell, where bilinear interpolation is worst.
+    in the middle of every cell and of every edge: in the middle of a cell alone, two bends of
+    opposite sense would cancel.
     """
 
     offsets: NDArray[np.float32]
@@ -128,14 +129,14 @@ def _grid(lens: BentLens, theta_max: float, size: int) -> OffsetGrid:
     p_max = float(np.tan(theta_max / 2))
     across = np.linspace(-p_max, p_max, size)
     # the nodes just outside the field hold up the cells on its rim; those farther off hold nothing
-    reach = min(p_max * (1 + 3 / (size - 1)), np.tan(np.nextafter(lens.hard_limit, 0) / 2))
+    reach = min(p_max * (1 + 3 / (size - 1)), _reach(lens))
     offsets = _offset_at(lens, across, reach).astype(np.float32)
-    o = offsets.astype(np.float64)
-    middle = (o[1:, 1:] + o[1:, :-1] + o[:-1, 1:] + o[:-1, :-1]) / 4
-    between = (across[1:] + across[:-1]) / 2
-    seen = np.hypot(*np.meshgrid(between, between)) <= p_max
-    strays = np.linalg.norm(middle - _offset_at(lens, between, reach), axis=-1)[seen]
-    return OffsetGrid(offsets, p_max, float(strays.max()))
+    grid = OffsetGrid(offsets, p_max, 0.0)
+    halves = np.linspace(-p_max, p_max, 2 * size - 1)
+    places = np.stack(np.meshgrid(halves, halves), axis=-1)
+    strays = np.linalg.norm(grid(places) - _offset_at(lens, halves, reach), axis=-1)
+    seen = np.linalg.norm(places, axis=-1) <= p_max
+    return replace(grid, residual_px=float(strays[seen].max()))
 
 
 def _offset_at(lens: BentLens, across: Floats, reach: float) -> Floats:
@@ -179,7 +180,11 @@ class Camera:
 
     @cached_property
     def grid(self) -> OffsetGrid | None:
-        return make_grid(self.lens, self.theta_max) if isinstance(self.lens, BentLens) else None
+        """The offsets of a lens that is not round; None where they are all 0."""
+        if not isinstance(self.lens, BentLens):
+            return None
+        grid = make_grid(self.lens, self.theta_max)
+        return grid if grid.offsets.any() else None
 
     @property
     def residual_px(self) -> float:
@@ -242,21 +247,32 @@ def _angles_of(lens: BentLens, point: Floats, theta_max: float) -> tuple[Floats,
     theta = np.where(np.isnan(theta), theta_max, theta)
     phi = np.arctan2(point[:, 1], point[:, 0])
     p = np.tan(theta / 2)[:, None] * np.stack([np.cos(phi), np.sin(phi)], axis=-1)
-    reach = min(1.05 * np.tan(theta_max / 2), np.tan(np.nextafter(lens.hard_limit, 0) / 2))
+    reach = min(1.05 * np.tan(theta_max / 2), _reach(lens))
     open_ = np.arange(len(p))  # those that have not closed yet
-    for _ in range(12):
-        error = point[open_] - _point_at(lens, p[open_], reach)
-        left = np.abs(error).max(axis=-1, initial=0) > 1e-10
-        open_, error = open_[left], error[left]
-        if not len(open_):
-            break
-        stepped = p[open_] + _solve(_slopes(lens, p[open_], reach), error)
-        length = np.maximum(np.hypot(stepped[:, 0], stepped[:, 1]), reach)[:, None]
-        p[open_] = stepped * (reach / length)
-    theta = 2 * np.arctan(np.hypot(p[:, 0], p[:, 1]))
-    closed = np.abs(point - _point_at(lens, p, reach)).max(axis=-1, initial=0) < 1e-6
+    with np.errstate(all="ignore"):  # a point with no answer may send its steps anywhere
+        for _ in range(12):
+            error = point[open_] - _point_at(lens, p[open_], reach)
+            left = np.abs(error).max(axis=-1, initial=0) > 1e-10
+            open_, error = open_[left], error[left]
+            if not len(open_):
+                break
+            stepped = p[open_] + _solve(_slopes(lens, p[open_], reach), error)
+            p[open_] = _within(stepped, reach)
+        theta = 2 * np.arctan(np.hypot(p[:, 0], p[:, 1]))
+        closed = np.abs(point - _point_at(lens, p, reach)).max(axis=-1, initial=0) < 1e-6
     theta[~closed | (theta > theta_max + 1e-12)] = np.nan
     return theta.reshape(shape), np.arctan2(p[:, 1], p[:, 0]).reshape(shape)
+
+
+def _reach(lens: Lens) -> float:
+    """|p| at the lens's hard limit."""
+    return float(np.tan(np.nextafter(lens.hard_limit, 0) / 2))
+
+
+def _within(p: Floats, reach: float) -> Floats:
+    """p (n, 2), drawn in to the circle of radius `reach`."""
+    length = np.maximum(np.hypot(p[:, 0], p[:, 1]), reach)[:, None]
+    return np.asarray(p * (reach / length))
 
 
 def _solve(matrices: Floats, values: Floats) -> Floats:
@@ -276,8 +292,9 @@ def _point_at(lens: Lens, p: Floats, reach: float) -> Floats:
 
 
 def _slopes(lens: Lens, p: Floats, reach: float) -> Floats:
-    """d point / d p, (n, 2, 2), by central differences."""
+    """d point / d p, (n, 2, 2), by central differences; on the rim of `reach`, just inside it."""
     step = 1e-6
+    p = _within(p, reach - 1.5 * step)
     columns = [
         (_point_at(lens, p + h, reach) - _point_at(lens, p - h, reach)) / (2 * step)
         for h in step * np.eye(2)
@@ -319,7 +336,9 @@ def make_camera(
         raise ProfileError(f"stretch {stretch.tolist()} flattens the picture to a line")
     limit = growth_limit(lens)
     if limit <= 0:
-        raise ProfileError(f"{lens}: the radius does not grow with the angle, not even on the axis")
+        raise ProfileError(
+            f"{_short(lens)}: the radius does not grow with the angle, not even on the axis"
+        )
     theta_max = (
         _corner_angle(size, lens, center, stretch, limit)
         if field_deg is None
@@ -330,7 +349,8 @@ def make_camera(
     rim = float(lens.radius(np.array([theta_max]))[0])
     if rim < 1:
         raise ProfileError(
-            f"{lens}: the whole image has a radius of {rim:.3g} pixels; parameters are in pixels"
+            f"{_short(lens)}: the whole image has a radius of {rim:.3g} pixels; "
+            "parameters are in pixels"
         )
     return Camera(size, lens, center, theta_max, stretch, camera_from_body)
 
@@ -352,26 +372,53 @@ def _claimed_angle(lens: Lens, field_deg: float, limit: float) -> float:
 
 def _unfolded(lens: BentLens, theta_max: float, field_deg: float | None) -> float:
     """The angle, at most theta_max, up to which no two rays land on one pixel."""
-    p = np.tan(np.linspace(0, theta_max, 181)[1:] / 2)
-    phi = np.radians(np.arange(0, 360, 5))[:, None, None]
-    around = np.concatenate([np.cos(phi), np.sin(phi)], axis=-1) * p[:, None]
-    reach = np.tan(np.nextafter(lens.hard_limit, 0) / 2)
-    slopes = _slopes(lens, around.reshape(-1, 2), reach)
-    folds = (np.linalg.det(slopes) <= 0).reshape(len(phi), len(p)).any(axis=0)
-    if not folds.any():
-        return theta_max
-    limit = theta_max * float(np.argmax(folds)) / 180
-    if field_deg is not None or limit < NARROWEST_RAD:
+    limit = _fold(lens, theta_max)
+    if limit < NARROWEST_RAD or (field_deg is not None and limit < theta_max - 1e-5):
         raise ProfileError(
-            f"this {type(lens).__name__} lens folds at {np.degrees(limit):.1f} degrees from the "
-            "axis: two rays land on one pixel; claim a smaller field_deg, or check the parameters"
+            f"this {type(lens).__name__} lens folds at {np.degrees(limit):.2f} degrees from the "
+            "axis: two rays land on one pixel; claim at most "
+            f"field_deg = {2 * np.degrees(limit):.1f}, or check the parameters"
         )
     return limit
 
 
+def _fold(lens: BentLens, theta_max: float) -> float:
+    """Where the image first folds over in any of 72 directions, looked for in 180 steps."""
+    theta = np.linspace(0, theta_max, 181)
+    whole = _whole(lens, theta[1:])
+    if whole.all():
+        return theta_max
+    first = int(np.argmin(whole))
+    low, high = theta[first], theta[first + 1]
+    for _ in range(30):
+        middle = (low + high) / 2
+        low, high = (middle, high) if _whole(lens, np.array([middle]))[0] else (low, middle)
+    return float(low)
+
+
+def _whole(lens: BentLens, theta: Floats) -> NDArray[np.bool_]:
+    """Whether the image keeps its sense on whole circles of these angles (n,)."""
+    phi = np.radians(np.arange(0, 360, 5))
+    p = np.tan(theta / 2)[:, None, None] * np.stack([np.cos(phi), np.sin(phi)], axis=-1)
+    with np.errstate(all="ignore"):
+        slopes = _slopes(lens, p.reshape(-1, 2), _reach(lens))
+        return (np.linalg.det(slopes) > 0).reshape(len(theta), len(phi)).all(axis=-1)
+
+
 def _below_pole(lens: Lens, theta: float) -> float:
     """Keep a hair away from an angle where the formula is infinite (tan at 90 degrees)."""
-    return min(theta, lens.hard_limit - 1e-3) if lens.hard_limit < np.pi else theta
+    last, hair = float(np.nextafter(lens.hard_limit, 0)), lens.hard_limit - 1e-3
+    if theta <= hair:
+        return theta
+    with np.errstate(all="ignore"):
+        near, at = lens.radius(np.array([hair, min(theta, last)]))
+    return min(theta, last) if at < 1.1 * near else hair
+
+
+def _short(lens: Lens) -> str:
+    """A lens with its parameters, for a message; splines have hundreds."""
+    text = str(lens)
+    return text if len(text) <= 200 else f"{text[:200]}...)"
 
 
 def _corner_angle(
