@@ -3,6 +3,7 @@
     FreelookError
     ├── ProfileError      a lens profile that is wrong; says where
     ├── FitError          measurements that no such lens can be fitted to
+    ├── CalibrationError  views of a target that no camera can be calibrated from
     ├── SourceError       video that cannot be opened or read
     ├── TrackerError      a head tracker that cannot be opened
     ├── RenderError       a picture or a view that cannot be rendered
@@ -24,6 +25,10 @@ class ProfileError(FreelookError):
 
 class FitError(FreelookError):
     """Measurements, or a camera, that the asked lens model cannot be fitted to."""
+
+
+class CalibrationError(FreelookError):
+    """Views of a target that no camera can be calibrated from; says what to do about it."""
 
 
 class SourceError(FreelookError):

@@ -1,0 +1,193 @@
+"""A first guess of lens, centre and poses, from nothing but the views.
+
+A flat target and the rays of its points obey ray x (H point) = 0 with H = [r1 r2 t], whatever the
+angle from the axis; no division by z, so rays beyond 90 degrees are like any other. A lens that is
+about right is one for which r1 and r2 come out orthonormal. So: try lenses of four shapes, many
+fields and a few centres, solve H for every view by one eigenvector (all at once), make a rotation
+of it, and keep what projects the points nearest to their pixels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from ..camera import Camera, make_camera
+from ..lens import Equidistant, Equisolid, Floats, Lens, Perspective, Stereographic
+from .views import Pose, View
+
+SHAPES: tuple[type[Lens], ...] = (Perspective, Stereographic, Equidistant, Equisolid)
+# angle from the axis of the outermost point seen
+OUTERMOST_DEG = (20, 28, 36, 45, 54, 63, 72, 81, 90, 98, 106)
+CENTERS = (-0.12, -0.06, 0.0, 0.06, 0.12)  # of the picture's size, from its middle
+FEW_POINTS, FEW_VIEWS = 24, 12  # enough to tell good from bad
+KEPT = 4
+
+
+@dataclass(frozen=True)
+class Guess:
+    """A camera, the target's pose in every view, and how far off that is (median, pixels)."""
+
+    camera: Camera
+    poses: tuple[Pose, ...]
+    error_px: float
+
+
+def first_guesses(views: Sequence[View], size: tuple[int, int]) -> list[Guess]:
+    """The best few guesses, best first; what is best here may lose after refinement."""
+    few = _Few(views)
+    scored = [
+        (few.error_px(lens, center), i, lens, center)
+        for i, (lens, center) in enumerate(_candidates(few.pixels, size))
+    ]
+    scored.sort(key=lambda entry: entry[:2])
+    return [_guess(lens, center, views, size, error) for error, _, lens, center in _varied(scored)]
+
+
+def pose_of(camera: Camera, view: View) -> Pose | None:
+    """Where the target is in one view of a known camera; None if its points are not seen."""
+    rays = camera.ray(view.pixels)
+    seen = np.isfinite(rays[:, 2])
+    return _pose(view.points[seen], rays[seen]) if seen.sum() >= 4 else None
+
+
+_Scored = tuple[float, int, Lens, tuple[float, float]]
+
+
+def _varied(scored: list[_Scored]) -> Iterator[_Scored]:
+    """The best, then the best of the other shapes: what fits a few points well may not all."""
+    shapes = set()
+    for entry in scored:
+        if type(entry[2]) not in shapes and np.isfinite(entry[0]):
+            shapes.add(type(entry[2]))
+            yield entry
+        if len(shapes) == KEPT:
+            return
+
+
+def _candidates(
+    pixels: Floats, size: tuple[int, int]
+) -> Iterator[tuple[Lens, tuple[float, float]]]:
+    middle = (np.array(size) - 1) / 2
+    for dx, dy in product(CENTERS, CENTERS):
+        center = middle + np.array([dx, dy]) * size
+        farthest = float(np.hypot(*(pixels.reshape(-1, 2) - center).T).max())
+        for shape, degrees in product(SHAPES, OUTERMOST_DEG):
+            if shape is Perspective and degrees > 80:
+                continue
+            unit = shape(1.0).radius(np.radians([degrees]))[0]  # type: ignore[call-arg]
+            lens = shape(farthest / unit)  # type: ignore[call-arg]
+            yield lens, (float(center[0]), float(center[1]))
+
+
+class _Few:
+    """Some points of some views, the same number of each, to try thousands of lenses on."""
+
+    def __init__(self, views: Sequence[View]) -> None:
+        thinned = [_thinned(view) for view in _spread(views)]
+        self.points = np.stack([view.points for view in thinned])  # (views, n, 3)
+        self.pixels = np.stack([view.pixels for view in thinned])  # (views, n, 2)
+        self.planes = [_plane(points) for points in self.points]
+        origins, axes, scales = (np.array(part) for part in zip(*self.planes, strict=True))
+        flat = np.einsum("vni,vij->vnj", self.points - origins[:, None], axes)
+        self.flat = flat[..., :2] / scales[:, None, None]
+
+    def error_px(self, lens: Lens, center: tuple[float, float]) -> float:
+        """Median over the views of their median pixel error, each with its own best pose."""
+        offset = self.pixels - center
+        theta = _angles(lens, np.hypot(offset[..., 0], offset[..., 1]))
+        rays = _rays(theta, np.arctan2(offset[..., 1], offset[..., 0]))
+        rotation, translation = _flat_pose(self.flat, rays)
+        seen = np.einsum("vij,vnj->vni", rotation[..., :2], self.flat) + translation[:, None]
+        theta = np.arctan2(np.hypot(seen[..., 0], seen[..., 1]), seen[..., 2])
+        phi = np.arctan2(seen[..., 1], seen[..., 0])
+        r = lens.radius(np.minimum(theta, 0.999 * lens.hard_limit))
+        error = np.stack([r * np.cos(phi), r * np.sin(phi)], axis=-1) - offset
+        return float(np.median(np.median(np.hypot(error[..., 0], error[..., 1]), axis=-1)))
+
+
+def _angles(lens: Lens, radius: Floats) -> Floats:
+    """The four shapes' own inverses."""
+    f = getattr(lens, "f")  # noqa: B009 - all four have one
+    x = radius / f
+    if isinstance(lens, Perspective):
+        return np.arctan(x)
+    if isinstance(lens, Stereographic):
+        return 2 * np.arctan(x / 2)
+    if isinstance(lens, Equidistant):
+        return np.asarray(x)
+    return 2 * np.arcsin(np.minimum(x / 2, 1.0))
+
+
+def _rays(theta: Floats, phi: Floats) -> Floats:
+    sine = np.sin(theta)
+    return np.stack([sine * np.cos(phi), sine * np.sin(phi), np.cos(theta)], axis=-1)
+
+
+def _pose(points: Floats, rays: Floats) -> Pose:
+    """The pose of a flat target whose points (n, 3) are seen along unit rays (n, 3), linearly."""
+    origin, axes, scale = _plane(points)
+    flat = (points - origin) @ axes[:, :2] / scale
+    rotation, translation = _flat_pose(flat[None], rays[None])
+    camera_from_target = rotation[0] @ axes.T
+    shift = translation[0] * scale - camera_from_target @ origin
+    return Pose(Rotation.from_matrix(camera_from_target), shift)
+
+
+def _flat_pose(flat: Floats, rays: Floats) -> tuple[Floats, Floats]:
+    """Rotations (views, 3, 3) and translations (views, 3) from points (views, n, 2) and rays."""
+    x = np.concatenate([flat, np.ones((*flat.shape[:-1], 1))], axis=-1)
+    # |ray x (H x)|^2 = (H x)^T (I - ray ray^T) (H x), a quadratic form in the nine of H
+    across = np.eye(3) - rays[..., :, None] * rays[..., None, :]
+    pairs = x[..., :, None] * x[..., None, :]
+    form = np.einsum("vnij,vnkl->vikjl", across, pairs, optimize=True).reshape(-1, 9, 9)
+    h = np.linalg.eigh(form)[1][..., 0].reshape(-1, 3, 3)
+    ahead = np.einsum("vni,vij,vnj->v", rays, h, x, optimize=True)
+    h = h * np.where(ahead < 0, -1.0, 1.0)[:, None, None]
+    length = np.linalg.norm(h[..., :2], axis=1).mean(axis=1)
+    h = h / np.maximum(length, 1e-12)[:, None, None]
+    r1, r2 = h[..., 0], h[..., 1]
+    u, _, vt = np.linalg.svd(np.stack([r1, r2, np.cross(r1, r2)], axis=-1))
+    turn = u @ vt
+    u[..., 2] *= np.where(np.linalg.det(turn) < 0, -1.0, 1.0)[:, None]
+    return u @ vt, h[..., 2]
+
+
+def _plane(points: Floats) -> tuple[Floats, Floats, float]:
+    """Origin, right-handed axes (columns; the third is the normal) and size of flat points."""
+    origin = points.mean(axis=0)
+    _, spread, axes = np.linalg.svd(points - origin, full_matrices=False)
+    axes = axes.T * np.array([1.0, 1.0, np.sign(np.linalg.det(axes)) or 1.0])
+    return origin, axes, float(spread[0] / np.sqrt(len(points)))
+
+
+def _guess(
+    lens: Lens,
+    center: tuple[float, float],
+    views: Sequence[View],
+    size: tuple[int, int],
+    error_px: float,
+) -> Guess:
+    poses = []
+    for view in views:
+        offset = view.pixels - center
+        theta = _angles(lens, np.hypot(offset[:, 0], offset[:, 1]))
+        poses.append(_pose(view.points, _rays(theta, np.arctan2(offset[:, 1], offset[:, 0]))))
+    return Guess(make_camera(size, lens, center=center), tuple(poses), error_px)
+
+
+def _spread(views: Sequence[View]) -> list[View]:
+    """At most FEW_VIEWS of them, evenly; more say nothing new about a first guess."""
+    chosen = np.unique(np.linspace(0, len(views) - 1, FEW_VIEWS).astype(int))
+    return [views[i] for i in chosen]
+
+
+def _thinned(view: View) -> View:
+    """FEW_POINTS points of a view, the outermost of them for sure; some twice if it has fewer."""
+    far = np.argsort(-np.linalg.norm(view.pixels - view.pixels.mean(0), axis=1))
+    even = far[np.linspace(0, len(far) - 1, FEW_POINTS).astype(int)]
+    return View(view.name, view.points[even], view.pixels[even])
