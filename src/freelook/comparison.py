@@ -52,6 +52,17 @@ class Difference:
         return np.isfinite(self.distance_px) & np.isfinite(self.angle_deg)
 
     @property
+    def mean_shift_px(self) -> Floats:
+        """(x, y): how far B's picture is moved as a whole."""
+        return np.asarray(self.shift_px[self.common].mean(axis=0))
+
+    @property
+    def rms_px_unmoved(self) -> float:
+        """What is left of the root mean square without that."""
+        left = self.shift_px[self.common] - self.mean_shift_px
+        return _rms(np.hypot(left[:, 0], left[:, 1]))
+
+    @property
     def numbers(self) -> Numbers | None:
         """None where there is nothing in common."""
         if not self.common.any():

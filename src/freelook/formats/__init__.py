@@ -20,7 +20,7 @@ from ..errors import ProfileError
 from ._document import LARGEST_BYTES, Document
 from ._profile import Choice, Profile
 
-FORMATS = ("freelook", "opencv")
+FORMATS = ("freelook", "opencv", "ocamcalib", "py-ocamcalib", "colmap", "mrcal")
 
 __all__ = [
     "FORMATS",
@@ -34,6 +34,7 @@ __all__ = [
     "load_profile",
     "parse_camera",
     "parse_profile",
+    "read_document",
 ]
 
 
@@ -120,7 +121,12 @@ def _find(name: str) -> tuple[Document, str | None]:
     if not path.exists() and str(path) in builtin_names():
         text = (resources.files("freelook.lenses") / f"{path}.json").read_text("utf-8")
         return Document(text, f"{path}.json"), pick
-    return Document(_read_text(path), path.name), pick
+    return read_document(path), pick
+
+
+def read_document(path: Path) -> Document:
+    """The text of a file; ProfileError if it cannot be read, is too long or is no text."""
+    return Document(_read_text(path), path.name)
 
 
 def _read_text(path: Path) -> str:

@@ -98,5 +98,5 @@ def draw_by_angle(
         axes.fill_between(theta_deg, rms, largest, color=color, alpha=0.2, linewidth=0)
         axes.plot(theta_deg, rms, color=color, label=f"{name}: rms, and up to the largest")
     axes.set(xlim=(0, theta_deg[-1] * 1.02))
-    axes.set_ylim(bottom=0)
+    axes.set_ylim(0, 1.2 * axes.get_ylim()[1])  # room for the legend
     axes.legend(loc="upper left")
