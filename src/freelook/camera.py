@@ -92,7 +92,7 @@ class OffsetGrid:
     """e for lenses that are not round: `offsets` float32 (n, n, 2), pixels before the stretch.
 
     Entry [j, i] belongs to p = (-p_max + i step, -p_max + j step), step = 2 p_max / (n - 1).
-    `residual_px` is the largest distance between grid and formula where the lens sees, measured
+    `residual_px` is the largest distance between grid and formula over the picture, measured
     in the middle of every cell and of every edge: in the middle of a cell alone, two bends of
     opposite sense would cancel.
     """
@@ -116,42 +116,44 @@ class OffsetGrid:
         return np.asarray(top * (1 - part[..., 1, :]) + below * part[..., 1, :])
 
 
-def make_grid(lens: BentLens, theta_max: float) -> OffsetGrid:
-    """The smallest of a few grids that strays less than 0.004 px, or the largest of them."""
+def make_grid(camera: Camera) -> OffsetGrid | None:
+    """The smallest of a few grids that strays less than 0.004 px, or the largest of them.
+
+    None for a round lens, and for one whose offsets are all 0.
+    """
+    if not isinstance(camera.lens, BentLens):
+        return None
     for size in GRID_SIZES:
-        grid = _grid(lens, theta_max, size)
+        grid = _grid(camera, camera.lens, size)
         if grid.residual_px < GRID_TOLERANCE_PX:
             break
-    return grid
+    return grid if grid.offsets.any() else None
 
 
-def _grid(lens: BentLens, theta_max: float, size: int) -> OffsetGrid:
-    p_max = float(np.tan(theta_max / 2))
-    across = np.linspace(-p_max, p_max, size)
+def _grid(camera: Camera, lens: BentLens, size: int) -> OffsetGrid:
+    p_max = float(np.tan(camera.theta_max / 2))
     # the nodes just outside the field hold up the cells on its rim; those farther off hold nothing
     reach = min(p_max * (1 + 3 / (size - 1)), _reach(lens))
-    offsets = _offset_at(lens, across, reach).astype(np.float32)
+    offsets = _offset_at(lens, _square(p_max, size), reach).astype(np.float32)
     grid = OffsetGrid(offsets, p_max, 0.0)
-    halves = np.linspace(-p_max, p_max, 2 * size - 1)
-    places = np.stack(np.meshgrid(halves, halves), axis=-1)
-    strays = np.linalg.norm(grid(places) - _offset_at(lens, halves, reach), axis=-1)
-    seen = np.linalg.norm(places, axis=-1) <= p_max
-    return replace(grid, residual_px=float(strays[seen].max()))
+    p = _square(p_max, 2 * size - 1)
+    exact = _offset_at(lens, p, reach)
+    strays = np.linalg.norm(grid(p) - exact, axis=-1)
+    seen = np.linalg.norm(p, axis=-1) <= p_max
+    point = p * camera.table((p * p).sum(axis=-1))[..., None] + exact
+    pixel = np.asarray(camera.center) + point @ camera.stretch.T
+    shown = seen & ((pixel > -2) & (pixel < np.array(camera.size) + 1)).all(axis=-1)
+    return replace(grid, residual_px=float(strays[shown].max(initial=0.0)))
 
 
-def _offset_at(lens: BentLens, across: Floats, reach: float) -> Floats:
-    """Offsets at all pairs of `across`; from |p| = reach on they go straight on.
+def _square(p_max: float, size: int) -> Floats:
+    across = np.linspace(-p_max, p_max, size)
+    return np.stack(np.meshgrid(across, across), axis=-1)
 
-    Nobody sees those, but a kink would spoil the interpolation next to the rim.
-    """
-    x, y = np.meshgrid(across, across)
-    phi, length = np.arctan2(y, x), np.hypot(x, y)
-    step = 1e-4 * reach
-    inner, held = (
-        lens.offset(2 * np.arctan(np.minimum(length, end)), phi) for end in (reach - step, reach)
-    )
-    beyond = np.maximum(length - reach, 0)[..., None]
-    return np.asarray(held + (held - inner) * (beyond / step))
+
+def _offset_at(lens: BentLens, p: Floats, reach: float) -> Floats:
+    theta = 2 * np.arctan(np.minimum(np.hypot(p[..., 0], p[..., 1]), reach))
+    return np.asarray(lens.offset(theta, np.arctan2(p[..., 1], p[..., 0])))
 
 
 @dataclass(frozen=True)
@@ -180,11 +182,8 @@ class Camera:
 
     @cached_property
     def grid(self) -> OffsetGrid | None:
-        """The offsets of a lens that is not round; None where they are all 0."""
-        if not isinstance(self.lens, BentLens):
-            return None
-        grid = make_grid(self.lens, self.theta_max)
-        return grid if grid.offsets.any() else None
+        """What renderers know of a lens that is not round, beside the table; None if it is."""
+        return make_grid(self)
 
     @property
     def residual_px(self) -> float:

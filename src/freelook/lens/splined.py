@@ -11,10 +11,10 @@ from scipy.interpolate import CubicSpline
 from ..errors import ProfileError
 from .base import FIXED, Floats
 
-# The mean over a ring of directions is the round part; it only has to be near, as the offset is
+# The mean over rings of directions is the round part. It only has to be near: the offset is
 # whatever is missing.
-RING = np.radians(np.arange(0, 180, 5.0))
-RINGS = 129
+DIRECTIONS = np.radians(np.arange(0, 180, 5.0))
+RINGS = 65
 
 
 @dataclass(frozen=True)
@@ -30,11 +30,10 @@ class SplinedStereographic:
     in both directions and centred on the axis: the surface covers fov_x_deg horizontally and
     what ny gives vertically. order is 2 or 3. f is fx; fy is in the camera's `stretch`.
 
-    Beyond the covered part mrcal continues the last polynomial; so does this to the outermost
-    control points, and holds the correction from there on. The lens ends at the corner of the
-    control points. Only `control` is free in fits: f says the same twice.
-
-    The round part is the mean over all directions.
+    The round part is the mean over all directions in which there are control points, the offset
+    what is missing. Beyond the covered part mrcal continues the last polynomial; so does this as
+    far as there are control points. Farther out it holds the offset, and the lens ends at the
+    corner of the control points. Only `control` is free in fits: f would say the same twice.
     """
 
     f: float = field(metadata=FIXED)
@@ -72,26 +71,42 @@ class SplinedStereographic:
 
     @cached_property
     def hard_limit(self) -> float:
-        reach = np.hypot(self.nx - 1, self.ny - 1) * self.spacing / 2
+        reach = np.hypot(*self._edge)
         return float(2 * np.arctan(reach / 2))
 
     def radius(self, theta: Floats) -> Floats:
         return self.f * np.asarray(self._round(np.tan(theta / 2)))
 
     def offset(self, theta: Floats, phi: Floats) -> Floats:
-        tangent, direction = np.tan(theta / 2), np.stack([np.cos(phi), np.sin(phi)], axis=-1)
-        u = 2 * tangent[..., None] * direction
-        return self.f * (u + self._surface(u) - self._round(tangent)[..., None] * direction)
+        direction = np.stack([np.cos(phi), np.sin(phi)], axis=-1)
+        u = np.clip(2 * np.tan(theta / 2)[..., None] * direction, -self._edge, self._edge)
+        distance = np.hypot(u[..., 0], u[..., 1])
+        # u goes to zero with the distance, so on the axis any direction is as good as another
+        outwards = np.divide(
+            u, distance[..., None], out=np.zeros_like(u), where=distance[..., None] > 0
+        )
+        round_part = np.asarray(self._round(distance / 2))[..., None] * outwards
+        return self.f * (u + self._surface(u) - round_part)
+
+    @cached_property
+    def _edge(self) -> Floats:
+        """Where the outermost control points are, (x, y), units of u."""
+        return np.array([self.nx - 1, self.ny - 1]) * self.spacing / 2
 
     @cached_property
     def _round(self) -> CubicSpline:
         """Mean distance from the axis, units of f, as a function of tan(theta/2), odd."""
-        tangent = np.linspace(0.0, np.tan(self.hard_limit / 2), RINGS)
-        direction = np.stack([np.cos(RING), np.sin(RING)], axis=-1)
-        u = 2 * tangent[:, None, None] * direction
+        # as far as the corner of the covered part; a straight line from there on
+        inner = self._edge - self.spacing * (self.order - 1) / 2
+        tangent = np.linspace(0.0, np.hypot(*inner) / 2, RINGS)
+        direction = np.stack([np.cos(DIRECTIONS), np.sin(DIRECTIONS)], axis=-1)
+        u = 2 * tangent[:, None, None] * np.append(direction, [inner / np.hypot(*inner)], axis=0)
         # opposite directions together: exactly 0 on the axis
         across = (self._surface(u) - self._surface(-u)) / 2
-        mean = 2 * tangent + (across * direction).sum(axis=-1).mean(axis=-1)
+        radial = (across * u).sum(axis=-1) / np.maximum(2 * tangent, 1e-9)[:, None]
+        # 1 where the surface is covered, falling to 0 where the control points end
+        weight = np.clip((self._edge - np.abs(u)) / (self._edge - inner), 0.0, 1.0).prod(axis=-1)
+        mean = 2 * tangent + (radial * weight).sum(axis=-1) / weight.sum(axis=-1)
         return CubicSpline(
             np.concatenate([-tangent[:0:-1], tangent]), np.concatenate([-mean[:0:-1], mean])
         )
