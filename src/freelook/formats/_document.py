@@ -1,18 +1,21 @@
-"""The text of a profile, and what it is when it is JSON or YAML; both are read safely."""
+"""The text of a profile, and what it says as JSON, YAML or XML; all three are read safely."""
 
 from __future__ import annotations
 
 import json
+import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NoReturn
-
-import yaml
+from xml.etree import ElementTree
 
 from ..errors import ProfileError
+from ._yaml import parse_yaml
 
 LARGEST_BYTES = 16 * 2**20  # with all its optimisation inputs an mrcal model has a few MiB
-LARGEST_YAML = 2**20  # YAML takes seconds per MiB, and no calibration has more than some kB
+LARGEST_TREE = 2 * 2**20  # JSON and XML take up to a second per MiB; profiles are far smaller
+DEEPEST = 64
 
 
 @dataclass(frozen=True)
@@ -31,9 +34,18 @@ class Document:
     def yaml(self) -> Any:
         """What the text says if it is YAML (OpenCV's kind too), else None.
 
-        The reason is in `why_not_yaml`. JSON is no YAML here.
+        The reason is in `why_not_yaml`. JSON and XML are no YAML here.
         """
         return self._yaml[0]
+
+    @cached_property
+    def xml(self) -> ElementTree.Element | None:
+        """The root if the text is XML, without a document type, else None.
+
+        The reason is in `why_not_xml`.
+        """
+        root: ElementTree.Element | None = self._xml[0]
+        return root
 
     @property
     def why_not_json(self) -> str:
@@ -44,84 +56,109 @@ class Document:
         return self._yaml[1]
 
     @property
+    def why_not_xml(self) -> str:
+        return self._xml[1]
+
+    @property
     def looks_like_json(self) -> bool:
-        return self.text.lstrip("\ufeff \t\r\n")[:1] in ("{", "[")
+        return self._first in ("{", "[")
+
+    @property
+    def looks_like_xml(self) -> bool:
+        return self._first == "<"
+
+    @property
+    def _first(self) -> str:
+        return self.text.lstrip("\ufeff \t\r\n")[:1]
 
     @cached_property
     def _json(self) -> tuple[Any, str]:
-        try:
-            text = self.text.removeprefix("\ufeff")
-            return json.loads(text, parse_constant=_no_constant, object_pairs_hook=_no_twins), ""
-        except _NoProfileError as error:
-            return None, str(error)
-        except RecursionError:
-            return None, "nested too deeply to be a lens profile"
-        except json.JSONDecodeError as error:
-            return None, f"not JSON: {error.msg} in line {error.lineno}, column {error.colno}"
-        except ValueError as error:  # an integer of thousands of digits
-            return None, f"not JSON: {error}"
+        return _tried(parse_json, self.text)
 
     @cached_property
     def _yaml(self) -> tuple[Any, str]:
-        if self.looks_like_json:
-            return None, "it is JSON"
-        if len(self.text) > LARGEST_YAML:
-            return None, f"more than {LARGEST_YAML >> 20} MiB of YAML are no lens profile"
-        try:
-            return yaml.load(_plain_yaml(self.text), Loader=_Loader), ""
-        except _NoProfileError as error:
-            return None, str(error)
-        except RecursionError:
-            return None, "nested too deeply to be a lens profile"
-        except yaml.MarkedYAMLError as error:
-            mark = error.problem_mark
-            where = f" in line {mark.line + 1}, column {mark.column + 1}" if mark else ""
-            return None, f"not YAML: {error.problem}{where}"
-        except (yaml.YAMLError, ValueError) as error:
-            return None, f"not YAML: {error}"
+        if self.looks_like_json or self.looks_like_xml:
+            return None, "it is JSON" if self.looks_like_json else "it is XML"
+        return _tried(parse_yaml, self.text)
+
+    @cached_property
+    def _xml(self) -> tuple[Any, str]:
+        return _tried(parse_xml, self.text) if self.looks_like_xml else (None, "not XML")
 
 
-class _NoProfileError(Exception):
-    """The text is well formed and still cannot be a profile."""
+def _tried(parse: Callable[[str], Any], text: str) -> tuple[Any, str]:
+    try:
+        return parse(text), ""
+    except ProfileError as error:
+        return None, str(error)
+
+
+def parse_json(text: str) -> Any:
+    """What a JSON text says; ProfileError says why it is none, or none that can be a profile.
+
+    Lines that begin with `//` are left out: OpenCV writes comments so.
+    """
+    _check_length(text, "JSON")
+    text = re.sub(r"^[ \t]*//.*$", "", text.removeprefix("\ufeff"), flags=re.M)
+    try:
+        value = json.loads(text, parse_constant=_no_constant, object_pairs_hook=_no_twins)
+    except RecursionError:
+        raise ProfileError("nested too deeply to be a lens profile") from None
+    except json.JSONDecodeError as error:
+        where = f"in line {error.lineno}, column {error.colno}"
+        raise ProfileError(f"not JSON: {error.msg} {where}") from None
+    except ValueError as error:  # an integer of thousands of digits
+        raise ProfileError(f"not JSON: {error}") from None
+    if _is_deep(value):
+        raise ProfileError("nested too deeply to be a lens profile")
+    return value
+
+
+def parse_xml(text: str) -> ElementTree.Element:
+    """The root of an XML text; ProfileError says why it is none, or none that is read here.
+
+    A document type is refused: entities, which grow without end or fetch files, live only there.
+    """
+    _check_length(text, "XML")
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise ProfileError("XML with a document type (<!DOCTYPE ...>) is not read; remove it")
+    try:
+        return ElementTree.fromstring(text.lstrip("\ufeff \t\r\n"))
+    except ElementTree.ParseError as error:
+        raise ProfileError(f"not XML: {error}") from None
+    except (ValueError, LookupError) as error:  # half a surrogate pair, an unknown encoding
+        raise ProfileError(f"not XML: {error}") from None
+
+
+def _check_length(text: str, what: str) -> None:
+    if len(text) > LARGEST_TREE:
+        raise ProfileError(f"more than {LARGEST_TREE >> 20} MiB of {what} are no lens profile")
+
+
+def _is_deep(value: Any) -> bool:
+    level = [value]
+    for _ in range(DEEPEST):
+        level = [child for item in level for child in _children(item)]
+        if not level:
+            return False
+    return True
+
+
+def _children(value: Any) -> list[Any]:
+    return list(value.values()) if isinstance(value, dict) else value if type(value) is list else []
 
 
 def _no_constant(text: str) -> NoReturn:
-    raise _NoProfileError(f"{text} is not a number a lens can have")
+    raise ProfileError(f"{text} is not a number a lens can have")
 
 
 def _no_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     seen = set()
     for name, _ in pairs:
         if name in seen:
-            raise _NoProfileError(f"key '{name}' is given twice")
+            raise ProfileError(f"key '{name:.80}' is given twice")
         seen.add(name)
     return dict(pairs)
-
-
-def _plain_yaml(text: str) -> str:
-    """OpenCV writes "%YAML:1.0" where YAML wants a space; the line says nothing, so it goes."""
-    text = text.removeprefix("\ufeff")
-    return text.partition("\n")[2] if text.startswith("%YAML") else text
-
-
-class _Loader(yaml.SafeLoader):
-    """Plain values and OpenCV's matrices; no aliases (a small file could grow without end)."""
-
-    def compose_node(self, parent: Any, index: Any) -> Any:
-        if self.check_event(yaml.events.AliasEvent):
-            raise _NoProfileError("YAML aliases (*name) are not read in lens profiles")
-        return super().compose_node(parent, index)
-
-    def construct_pairs_checked(self, node: Any) -> dict[Any, Any]:
-        pairs = self.construct_pairs(node, deep=True)
-        for key, _ in pairs:
-            if not isinstance(key, (str, int, float)):
-                raise _NoProfileError(f"{key!r} is not a key a lens profile can have")
-        return _no_twins([(str(key), value) for key, value in pairs])
-
-
-_Loader.add_constructor("tag:yaml.org,2002:map", _Loader.construct_pairs_checked)
-_Loader.add_constructor("tag:yaml.org,2002:opencv-matrix", _Loader.construct_pairs_checked)
 
 
 def expect_mapping(value: Any, where: str) -> dict[str, Any]:
