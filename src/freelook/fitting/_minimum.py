@@ -17,7 +17,7 @@ Function = Callable[[Floats], Floats]
 # Residuals of this many standard deviations are where a robust loss begins to differ from least
 # squares: soft_l1 then keeps about 95 % of the efficiency on normal noise.
 TURN = 1.5
-ROUGH, CLOSE = 1e-4, 1e-13  # where to stop, relative
+ROUGH, CLOSE = 1e-4, 1e-11  # where to stop, relative
 LOSSES = ("linear", "soft_l1", "cauchy")
 
 
@@ -179,7 +179,7 @@ class _Problem:
                 ftol=tolerance,
                 xtol=tolerance,
                 gtol=1e-15,
-                max_nfev=20 if tolerance == ROUGH else 200,
+                max_nfev=20 if tolerance == ROUGH else 100,
             )
         return np.asarray(x + found.x * self._unit)
 
@@ -191,22 +191,27 @@ class _Problem:
 
     def _rows(self, x: Floats) -> Floats:
         """Data, then constraints; something large where the parameters make no sense."""
-        rows = self.values(x)
-        if self._constraints is not None:
-            with np.errstate(all="ignore"):
-                rows = np.concatenate([rows, self._constraints(x)])
         limit = 1e6 * self._size
-        return np.clip(np.nan_to_num(rows, nan=limit, posinf=limit, neginf=-limit), -limit, limit)
+        rows = np.nan_to_num(self._raw(x), nan=limit, posinf=limit, neginf=-limit)
+        return np.clip(rows, -limit, limit)
+
+    def _raw(self, x: Floats) -> Floats:
+        if self._constraints is None:
+            return self.values(x)
+        with np.errstate(all="ignore"):
+            return np.concatenate([self.values(x), self._constraints(x)])
 
     def _jacobian(self, x: Floats) -> Floats:
         """d rows / d y, by central differences; one-sided where one side makes no sense."""
-        columns = []
+        here, columns = self._raw(x), []
         for unit in np.diag(self._unit):
-            ahead = unit if np.isfinite(self.values(x + unit)).all() else 0 * unit
-            behind = unit if np.isfinite(self.values(x - unit)).all() else 0 * unit
-            steps = max(1, int(ahead.any()) + int(behind.any()))
-            columns.append((self._rows(x + ahead) - self._rows(x - behind)) / steps)
-        return np.stack(columns, axis=-1)
+            ahead, behind, steps = self._raw(x + unit), self._raw(x - unit), 2.0
+            if not np.isfinite(ahead).all():
+                ahead, steps = here, steps - 1
+            if not np.isfinite(behind).all():
+                behind, steps = here, steps - 1
+            columns.append((ahead - behind) / max(steps, 1.0))
+        return np.nan_to_num(np.stack(columns, axis=-1), nan=0.0, posinf=0.0, neginf=0.0)
 
     def _step(self, j: int) -> float:
         """The change of parameter j that moves the data by 1e-4 of their size, about.

@@ -13,6 +13,7 @@ from ..lens import MODELS, Floats, Lens, RadialSpline, growth_limit, vector, wit
 # The slope that a fitted radius keeps at least, as a share of its mean slope.
 LEAST_SLOPE = 1e-3
 CELLS = 90
+RECTILINEAR = ("perspective", "poly3", "poly5", "ptlens", "opencv_rational")
 
 Bools = NDArray[np.bool_]
 
@@ -32,7 +33,7 @@ def default_lens(name: str, theta_max: float, knots: int) -> Lens:
     """
     model = known_model(name)
     if model is RadialSpline:
-        angles = np.linspace(0, theta_max, knots + 1)[1:]
+        angles = np.linspace(0, theta_max * (1 + 1e-9), knots + 1)[1:]
         return RadialSpline(tuple(map(float, np.degrees(angles))), tuple(map(float, angles)))
     if sum(f.default is MISSING for f in fields(model)) > 1:  # type: ignore[arg-type]
         raise FitError(f"{name} has no lens to start a fit from")
@@ -73,6 +74,17 @@ def slope_shortfall(lens: Lens, theta_max: float, least: float = LEAST_SLOPE) ->
     radius = radius_of(lens, np.linspace(0, theta_max, CELLS + 1))
     mean = abs(radius[-1]) + 1e-9 * np.abs(radius).max() + 1e-300
     return np.asarray(np.maximum(0.0, least - np.diff(radius) / mean * CELLS))
+
+
+def model_end(model: str) -> float:
+    """The angle in radians that no lens of a model goes beyond.
+
+    Models that become infinite at 90 degrees end at 85 here: five degrees more would be nine
+    tenths of all pixels.
+    """
+    if model == "orthographic":
+        return np.pi / 2 - 1e-3
+    return np.radians(85.0) if model in RECTILINEAR else np.pi
 
 
 def grows(lens: Lens, theta_max: float) -> bool:

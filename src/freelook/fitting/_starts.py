@@ -10,22 +10,28 @@ from ._curve_data import CurveData
 from ._models import default_lens, lens_with, radius_of, scaled
 
 
-def starting_curves(model: str, data: CurveData, most: int = 3) -> list[tuple[Lens, float]]:
+def starting_curves(
+    model: str, data: CurveData, knots: int | None = None, most: int = 3
+) -> list[tuple[Lens, float]]:
     """The best few of some simple lenses of a model, with offsets in pixels, best first.
 
     They have the scale that suits the measured radii and all other parameters at their defaults,
     or one of them changed: some models have more than one valley to end in.
     """
-    found = [start for shape in _shapes(model, data) if (start := _scaled(shape, data)) is not None]
+    found = [
+        start
+        for shape in _shapes(model, data, knots)
+        if (start := _scaled(shape, data)) is not None
+    ]
     if not found:
         raise FitError(f"no {model} lens comes near these radii; do they grow with the angle?")
     found.sort(key=lambda start: start[0])
     return [(lens, offset) for _, lens, offset in found[:most]]
 
 
-def _shapes(model: str, data: CurveData) -> list[Lens]:
+def _shapes(model: str, data: CurveData, knots: int | None) -> list[Lens]:
     """Lenses of a model with scale 1: all defaults, then one parameter changed at a time."""
-    plain = default_lens(model, data.theta_max, knots_for(len(data.theta)))
+    plain = default_lens(model, data.theta_max, knots or knots_for(len(data.theta)))
     x = vector(plain)
     shapes: list[Lens | None] = [plain]
     if not isinstance(plain, RadialSpline):  # there every parameter is a radius

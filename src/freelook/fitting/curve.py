@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import FitError
 from ..lens import MODELS, Floats, Lens
-from ._curve_data import CurveProblem, checked
+from ._curve_data import CurveData, CurveProblem, checked
 from ._minimum import Minimum, spread
 from ._models import LEAST_SLOPE, check_growth, grows, known_model, radius_of
 from ._scores import aic, aicc, bic
@@ -178,18 +178,7 @@ def fit_curve(
     if model in NOT_CURVES:
         raise FitError(f"{model} cannot be fitted to a curve; {NOT_CURVES[model]}")
     data = checked(theta, radius_px, sigma_px, free_offset, loss)
-    starts = [
-        (CurveProblem.of(data, lens), offset) for lens, offset in starting_curves(model, data)
-    ]
-    p, n = len(starts[0][0].names), len(data.theta)
-    if n <= p:
-        raise FitError(f"{model} has {p} parameters here; it needs {p + 1} points, not {n}")
-    ends = [
-        (problem, problem.fit(problem.start(problem.like, offset), data.theta_max, rough=True))
-        for problem, offset in starts
-    ]
-    problem, found = max(ends, key=lambda end: end[0].log_likelihood(end[1]))
-    found = problem.fit(found.x, data.theta_max)
+    problem, found = best_curve(model, data)
     lens, found = _growing(model, problem, found)
     return CurveFit(
         model=model,
@@ -204,6 +193,25 @@ def fit_curve(
         _problem=problem,
         _minimum=found,
     )
+
+
+def best_curve(
+    model: str, data: CurveData, knots: int | None = None
+) -> tuple[CurveProblem, Minimum]:
+    """The deepest minimum found; whether its lens grows all the way is not yet looked at."""
+    starts = [
+        (CurveProblem.of(data, lens), offset)
+        for lens, offset in starting_curves(model, data, knots)
+    ]
+    p, n = len(starts[0][0].names), len(data.theta)
+    if n <= p:
+        raise FitError(f"{model} has {p} parameters here; it needs {p + 1} points, not {n}")
+    ends = [
+        (problem, problem.fit(problem.start(problem.like, offset), data.theta_max, rough=True))
+        for problem, offset in starts
+    ]
+    problem, found = max(ends, key=lambda end: end[0].log_likelihood(end[1]))
+    return problem, problem.fit(found.x, data.theta_max)
 
 
 def rank(fits: Sequence[CurveFit]) -> list[CurveFit]:
