@@ -13,7 +13,8 @@ solved once more by plain least squares, so that the stated uncertainty means wh
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,20 +22,12 @@ from scipy.spatial.transform import Rotation
 
 from ..camera import Camera
 from ..errors import CalibrationError
-from ..lens import Floats, Lens, image_point, vector, with_vector
+from ..lens import Floats, image_point
+from .parameters import Freedom, Parameters, difference_step
 from .views import Pose, View
 
 STEPS = 60
 REJECT = 4.5  # times the noise per coordinate: chance drops 4 in 100,000 good points
-
-
-@dataclass(frozen=True)
-class Freedom:
-    """What of the sensor is solved for beside the lens itself."""
-
-    center: bool = True
-    aspect: bool = True
-    skew: bool = False
 
 
 @dataclass(frozen=True)
@@ -45,10 +38,10 @@ class Solution:
     poses       the target's, one for each view
     residuals   (n, 2) for each view: seen minus projected, pixels
     inliers     (n,) for each view: the points that count
-    covariance  (k, k) of `values(camera)`: lens vector, centre x and y, aspect, skew, as far as
-                they were free; the noise taken from the residuals
+    covariance  (k, k) of the free values (see `parameters`); the noise taken from the residuals
     names       of those
-    condition   of the scaled normal equations of the camera alone; above 1e12 they say nothing
+    condition   of the scaled normal equations of the camera alone; above 1e14 they say nothing
+    noise_px    standard deviation of a coordinate, from the points that count
     """
 
     camera: Camera
@@ -87,7 +80,7 @@ def solve(
     camera.
     """
     problem = _Problem(views, camera, freedom or Freedom())
-    state = _State(problem.values(camera), tuple(poses))
+    state = _State(problem.parameters.values, tuple(poses))
     counted = np.ones(problem.count)
     if robust:
         state = _graduated(problem, state)
@@ -101,7 +94,7 @@ def solve(
 
 def resect(camera: Camera, pose: Pose, view: View) -> tuple[Pose, Floats]:
     """The best pose of one view in a known camera, robustly, and its residuals (n, 2)."""
-    problem = _Problem([view], camera, Freedom(False, False, False), fixed_lens=True)
+    problem = _Problem([view], camera, Freedom(lens=False, center=False, aspect=False))
     state = _graduated(problem, _State(np.zeros(0), (pose,)))
     return state.poses[0], problem.residuals(state)
 
@@ -113,77 +106,23 @@ class _State:
 
 
 class _Problem:
-    """The views stacked, and what a vector of values means."""
+    """The views stacked, and what a row of values means."""
 
-    def __init__(
-        self, views: Sequence[View], camera: Camera, freedom: Freedom, fixed_lens: bool = False
-    ) -> None:
+    def __init__(self, views: Sequence[View], camera: Camera, freedom: Freedom) -> None:
         self.views = views
-        self.camera = camera
-        self._freedom = freedom
-        self._lens_count = 0 if fixed_lens else len(vector(camera.lens))
+        self.parameters = Parameters(camera, freedom)
         self.pixels = np.concatenate([view.pixels for view in views])
         self.count = len(self.pixels)
         ends = np.cumsum([0, *(len(view.pixels) for view in views)])
-        self.parts = [slice(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        free = self._freedom
-        names = lens_names(self.camera.lens) if self._lens_count else ()
-        return (
-            *names,
-            *(("center_x", "center_y") if free.center else ()),
-            *(("aspect",) if free.aspect else ()),
-            *(("skew",) if free.skew else ()),
-        )
-
-    def values(self, camera: Camera) -> Floats:
-        free, stretch = self._freedom, camera.stretch
-        return np.concatenate(
-            [
-                vector(camera.lens) if self._lens_count else [],
-                camera.center if free.center else [],
-                [stretch[1, 1]] if free.aspect else [],
-                [stretch[0, 1]] if free.skew else [],
-            ]
-        )
-
-    def camera_of(self, values: Floats) -> Camera:
-        free, left = self._freedom, list(map(float, values[self._lens_count :]))
-        lens: Lens = self.camera.lens
-        if self._lens_count:
-            lens = with_vector(lens, values[: self._lens_count])
-        center = (left.pop(0), left.pop(0)) if free.center else self.camera.center
-        stretch = self.camera.stretch.copy()
-        if free.aspect:
-            stretch[1, 1] = left.pop(0)
-        if free.skew:
-            stretch[0, 1] = left.pop(0)
-        return replace(self.camera, lens=lens, center=center, stretch=stretch)
+        self.parts = [slice(a, b) for a, b in pairwise(ends)]
 
     def in_camera(self, poses: Sequence[Pose]) -> Floats:
         seen = [pose.apply(v.points) for pose, v in zip(poses, self.views, strict=True)]
         return np.concatenate(seen)
 
     def residuals(self, state: _State) -> Floats:
-        return self.pixels - project(self.camera_of(state.values), self.in_camera(state.poses))
-
-
-def lens_names(lens: Lens) -> tuple[str, ...]:
-    """Names of what `vector` holds; entries of lists are numbered, as in radii_px[2]."""
-    from dataclasses import fields
-
-    names: list[str] = []
-    for field in fields(lens):  # type: ignore[arg-type]
-        value = getattr(lens, field.name)
-        if field.metadata.get("fixed"):
-            continue
-        if isinstance(value, tuple):
-            names += [f"{field.name}[{i}]" for i in range(len(value))]
-        else:
-            names.append(field.name)
-    return tuple(names)
+        camera = self.parameters.camera_of(state.values)
+        return self.pixels - project(camera, self.in_camera(state.poses))
 
 
 def project(camera: Camera, points: Floats) -> Floats:
@@ -336,15 +275,8 @@ def _scaled_solve(left: Floats, right: Floats) -> Floats:
 
 def slopes(problem: _Problem, state: _State) -> tuple[Floats, Floats]:
     """d pixel / d values (n, 2, k) and d pixel / d (rotation vector, translation) (n, 2, 6)."""
-    camera, points = problem.camera_of(state.values), problem.in_camera(state.poses)
-    by_camera = np.empty((problem.count, 2, len(state.values)))
-    for i, value in enumerate(state.values):
-        h = 1e-6 * max(abs(value), 0.1)
-        up, down = state.values.copy(), state.values.copy()
-        up[i] += h
-        down[i] -= h
-        ahead, behind = (project(problem.camera_of(v), points) for v in (up, down))
-        by_camera[:, :, i] = (ahead - behind) / (2 * h)
+    camera, points = problem.parameters.camera_of(state.values), problem.in_camera(state.poses)
+    by_camera = value_slopes(problem.parameters, state.values, points)
     by_point = point_slopes(camera, points)
     by_pose = np.empty((problem.count, 2, 6))
     for part, pose in zip(problem.parts, state.poses, strict=True):
@@ -352,6 +284,18 @@ def slopes(problem: _Problem, state: _State) -> tuple[Floats, Floats]:
         by_pose[part, :, :3] = -np.einsum("nij,njk->nik", by_point[part], cross_matrices(turned))
     by_pose[:, :, 3:] = by_point
     return by_camera, by_pose
+
+
+def value_slopes(parameters: Parameters, values: Floats, points: Floats) -> Floats:
+    """d pixel / d values (n, 2, k) of points in the camera frame, by central differences."""
+    columns = np.empty((len(points), 2, len(values)))
+    for i, value in enumerate(values):
+        step = np.zeros(len(values))
+        step[i] = difference_step(value)
+        ahead = project(parameters.camera_of(values + step), points)
+        behind = project(parameters.camera_of(values - step), points)
+        columns[:, :, i] = (ahead - behind) / (2 * step[i])
+    return columns
 
 
 def point_slopes(camera: Camera, points: Floats) -> Floats:
@@ -390,12 +334,12 @@ def _solution(problem: _Problem, state: _State, counted: Floats) -> Solution:
         )
     variance = float(counted @ _squares(residuals)) / surplus
     return Solution(
-        problem.camera_of(state.values),
+        problem.parameters.camera_of(state.values),
         state.poses,
         tuple(residuals[part] for part in problem.parts),
         tuple(counted[part] > 0 for part in problem.parts),
         variance * np.linalg.inv(unit) * np.outer(scale, scale),
-        problem.names,
+        problem.parameters.names,
         condition,
         float(np.sqrt(variance)),
     )
