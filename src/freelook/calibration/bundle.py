@@ -27,6 +27,7 @@ from .parameters import Freedom, Parameters, difference_step
 from .views import Pose, View
 
 STEPS = 60
+ENOUGH = 1e-8  # relative gain of a step that is the last
 REJECT = 4.5  # times the noise per coordinate: chance drops 4 in 100,000 good points
 
 
@@ -73,22 +74,23 @@ def solve(
     freedom: Freedom | None = None,
     *,
     robust: bool = True,
+    steps: int = STEPS,
 ) -> Solution:
     """Adjust everything, starting from a camera and poses that are about right.
 
-    `robust=False` counts every point fully. CalibrationError when the views do not determine the
+    `robust=False` counts every point fully. `steps` bounds each minimisation. CalibrationError when the views do not determine the
     camera.
     """
     problem = _Problem(views, camera, freedom or Freedom())
     state = _State(problem.parameters.values, tuple(poses))
     counted = np.ones(problem.count)
     if robust:
-        state = _graduated(problem, state)
+        state = _graduated(problem, state, steps)
         counted = _inliers(problem, state)
-    state = _minimise(problem, state, lambda _: counted)
+    state = _minimise(problem, state, lambda _: counted, steps)
     if robust:  # the last step may have brought some back, or pushed some out
         counted = _inliers(problem, state)
-        state = _minimise(problem, state, lambda _: counted)
+        state = _minimise(problem, state, lambda _: counted, steps)
     return _solution(problem, state, counted)
 
 
@@ -140,12 +142,12 @@ def project(camera: Camera, points: Floats) -> Floats:
 _Weights = Callable[[Floats], Floats]
 
 
-def _graduated(problem: _Problem, state: _State) -> _State:
+def _graduated(problem: _Problem, state: _State, steps: int = STEPS) -> _State:
     """Robust steps: the scale follows the residuals down to their noise."""
     for _ in range(6):
         scale = 3 * max(_noise(problem.residuals(state)), 1e-6)
         before = scale
-        state = _minimise(problem, state, lambda r, s=scale: (1 + _squares(r) / s**2) ** -2)  # type: ignore[misc]
+        state = _minimise(problem, state, _geman_mcclure(scale), steps)
         if _noise(problem.residuals(state)) * 3 > 0.95 * before:
             break
     return state
@@ -166,11 +168,15 @@ def _squares(residuals: Floats) -> Floats:
     return np.asarray(np.sum(residuals**2, axis=-1))
 
 
-def _minimise(problem: _Problem, state: _State, weights_of: _Weights) -> _State:
+def _geman_mcclure(scale: float) -> _Weights:
+    return lambda residuals: np.asarray((1 + _squares(residuals) / scale**2) ** -2)
+
+
+def _minimise(problem: _Problem, state: _State, weights_of: _Weights, steps: int = STEPS) -> _State:
     """Levenberg-Marquardt with weights that follow the residuals."""
     damping = 1e-3
     residuals = problem.residuals(state)
-    for _ in range(STEPS):
+    for _ in range(steps):
         weights = weights_of(residuals)
         cost = float(weights @ _squares(residuals))
         equations = _Equations.of(problem, state, residuals, weights)
@@ -186,7 +192,7 @@ def _minimise(problem: _Problem, state: _State, weights_of: _Weights) -> _State:
                 return state
         gain = 1 - float(weights @ _squares(new)) / cost
         state, residuals, damping = moved, new, max(damping / 6, 1e-12)
-        if gain < 1e-9:
+        if gain < ENOUGH:
             return state
     return state
 

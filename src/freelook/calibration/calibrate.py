@@ -17,7 +17,7 @@ import numpy as np
 from ..camera import Camera, make_camera
 from ..errors import CalibrationError, FreelookError, ProfileError
 from ..fitting.refit import refit
-from ..lens import MODELS, Floats, KannalaBrandt, Lens, RadialSpline, growth_limit
+from ..lens import MODELS, KannalaBrandt, Lens, RadialSpline, growth_limit
 from .bundle import Solution, resect, rms, solve
 from .initial import Guess, first_guesses
 from .parameters import Freedom
@@ -39,7 +39,7 @@ WORTH_IT = 0.99
 FOLDS = 5
 KNOT_EVERY_DEG = 12.0
 MARGIN = np.radians(5.0)  # of field beyond the outermost point seen
-RACE_POINTS = 60  # of each view, to tell the guesses apart
+RACE_POINTS, RACE_STEPS = 40, 8  # of each view, to tell the guesses apart
 
 Progress = Callable[[str], None]
 
@@ -166,7 +166,9 @@ def _base(views: list[View], size: tuple[int, int], freedom: Freedom) -> Solutio
     refined = []
     for guess in first_guesses(views, size):
         try:
-            refined.append(solve(_kannala_brandt(guess), guess.poses, few, freedom))
+            refined.append(
+                solve(_kannala_brandt(guess), guess.poses, few, freedom, steps=RACE_STEPS)
+            )
         except FreelookError:
             continue
     if not refined:

@@ -23,9 +23,9 @@ from .views import Pose, View
 SHAPES: tuple[type[Lens], ...] = (Perspective, Stereographic, Equidistant, Equisolid)
 # angle from the axis of the outermost point seen
 OUTERMOST_DEG = (20, 28, 36, 45, 54, 63, 72, 81, 90, 98, 106)
-CENTERS = (-0.12, -0.06, 0.0, 0.06, 0.12)  # of the picture's size, from its middle
+CENTERS = (-0.1, 0.0, 0.1)  # of the picture's size, from its middle
 FEW_POINTS, FEW_VIEWS = 24, 12  # enough to tell good from bad
-KEPT = 4
+KEPT = 3
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ class _Few:
         theta = _angles(lens, np.hypot(offset[..., 0], offset[..., 1]))
         rays = _rays(theta, np.arctan2(offset[..., 1], offset[..., 0]))
         rotation, translation = _flat_pose(self.flat, rays)
-        seen = np.einsum("vij,vnj->vni", rotation[..., :2], self.flat) + translation[:, None]
+        seen = self.flat @ rotation[..., :2].swapaxes(1, 2) + translation[:, None]
         theta = np.arctan2(np.hypot(seen[..., 0], seen[..., 1]), seen[..., 2])
         phi = np.arctan2(seen[..., 1], seen[..., 0])
         r = lens.radius(np.minimum(theta, 0.999 * lens.hard_limit))
@@ -144,9 +144,11 @@ def _flat_pose(flat: Floats, rays: Floats) -> tuple[Floats, Floats]:
     # |ray x (H x)|^2 = (H x)^T (I - ray ray^T) (H x), a quadratic form in the nine of H
     across = np.eye(3) - rays[..., :, None] * rays[..., None, :]
     pairs = x[..., :, None] * x[..., None, :]
-    form = np.einsum("vnij,vnkl->vikjl", across, pairs, optimize=True).reshape(-1, 9, 9)
+    count = flat.shape[:2]
+    form = across.reshape(*count, 9).swapaxes(1, 2) @ pairs.reshape(*count, 9)  # [ij, kl]
+    form = form.reshape(-1, 3, 3, 3, 3).swapaxes(2, 3).reshape(-1, 9, 9)  # [ik, jl]
     h = np.linalg.eigh(form)[1][..., 0].reshape(-1, 3, 3)
-    ahead = np.einsum("vni,vij,vnj->v", rays, h, x, optimize=True)
+    ahead = np.sum(rays * (x @ h.swapaxes(1, 2)), axis=(1, 2))
     h = h * np.where(ahead < 0, -1.0, 1.0)[:, None, None]
     length = np.linalg.norm(h[..., :2], axis=1).mean(axis=1)
     h = h / np.maximum(length, 1e-12)[:, None, None]
