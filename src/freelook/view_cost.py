@@ -76,7 +76,7 @@ class ViewCost:
 
 
 def view_cost(
-    camera: Camera, camera_from_view: Rotation, viewport: Viewport, *, columns: int = 160
+    camera: Camera, camera_from_view: Rotation, viewport: Viewport, *, columns: int = 240
 ) -> ViewCost:
     """Measured on `columns` x rows samples of the view, on every pixel of a smaller one."""
     place = places(*sample_places(viewport.size, columns))
