@@ -260,9 +260,9 @@ EXAMPLES: dict[str, list[Example]] = {
             "Azure Kinect depth camera: panispani/3DReconstruct pointCloudGen/calib.md, 640 x 576",
         ),
         Example(
-            OpenCVRational(600.0, 0.1, -0.02, 0.001, -0.002, s1=0.002, s4=-0.0003, tau_x=0.05),
+            OpenCVRational(600.0, 0.1, -0.02, 0.001, -0.002, s1=0.002, s4=-0.0003, tau_x=0.03),
             90,
-            "made up: a sensor that is tilted by 3 degrees",
+            "made up: a sensor tilted by 1.7 degrees",
         ),
     ],
     "thin_prism_fisheye": [

@@ -78,15 +78,15 @@ def _lens(model: Any, values: Any) -> Lens:
     needed = {field.name for field in known if field.default is MISSING}
     names = {field.name for field in known}
     check_keys(values, needed, names, f"the parameters of model '{model}'")
+    lists = {field.name for field in known if "tuple" in str(field.type)}
     return LENS_MODELS[model](
-        **{name: _value(v, f"parameters.{name}") for name, v in values.items()}
+        **{
+            name: tuple(numbers(value, range(1, 4097), f"parameters.{name}"))
+            if name in lists
+            else number(value, f"parameters.{name}")
+            for name, value in values.items()
+        }
     )
-
-
-def _value(value: Any, where: str) -> float | tuple[float, ...]:
-    if isinstance(value, list):
-        return tuple(numbers(value, range(1, 4097), where))
-    return number(value, where)
 
 
 def _pair(value: Any) -> tuple[float, float]:

@@ -15,6 +15,7 @@ from .base import FIXED, Floats
 
 # In units of f: farther out a Taylor lens is not looked at. tan(theta) = 10000 is 89.994 degrees.
 FARTHEST = 1e4
+MOST_TERMS = 16
 
 
 @dataclass(frozen=True)
@@ -32,17 +33,26 @@ class OCamCalib:
     f: float
     taylor: tuple[float, ...] = (-1 / 3, 0.0, -1 / 45)
 
+    def __post_init__(self) -> None:
+        if not isinstance(self.taylor, tuple) or not 1 <= len(self.taylor) <= MOST_TERMS:
+            raise ProfileError(
+                f"taylor of an OCamCalib lens must be a list of 1 to {MOST_TERMS} numbers, "
+                f"not {self.taylor!r:.80}"
+            )
+
     @classmethod
     def from_coefficients(cls, a: Sequence[float]) -> OCamCalib:
         """From a0, a1, a2, ... in pixels, of either sign of a0 (OCamCalib's own is negative).
 
-        ProfileError if a0 is 0 or a1 is not.
+        ProfileError if a0 is 0, a1 is not, or the others are out of all proportion.
         """
         if len(a) < 3 or a[0] == 0 or a[1] != 0:
             raise ProfileError(f"a Taylor polynomial a0, a1 = 0, a2, ... is needed, not {list(a)}")
-        f = abs(a[0])
-        sign = np.sign(a[0])
-        return cls(f, tuple(float(sign * ak * f ** (k - 1)) for k, ak in enumerate(a) if k > 1))
+        with np.errstate(all="ignore"):
+            taylor = np.sign(a[0]) * np.array(a[2:]) * np.abs(a[0]) ** np.arange(1.0, len(a) - 1)
+        if not np.isfinite(taylor).all():
+            raise ProfileError(f"no lens has a Taylor polynomial {list(a)}")
+        return cls(abs(a[0]), tuple(taylor.tolist()))
 
     @property
     def coefficients(self) -> tuple[float, ...]:
@@ -84,9 +94,10 @@ class OCamCalib:
 
 def _depth(q: Floats, taylor: Sequence[float]) -> Floats:
     z = np.zeros_like(q)
-    for t in reversed(taylor):
-        z = q * (z + t)
-    return 1 + q * z
+    with np.errstate(under="ignore"):  # a term that small is none
+        for t in reversed(taylor):
+            z = q * (z + t)
+        return np.asarray(1 + q * z)
 
 
 def _angle(q: Floats, taylor: Sequence[float]) -> Floats:
