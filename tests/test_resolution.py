@@ -7,6 +7,7 @@ import pytest
 
 from freelook.camera import Camera, make_camera
 from freelook.lens import (
+    MODELS,
     Equidistant,
     Equisolid,
     KannalaBrandt,
@@ -29,6 +30,7 @@ from freelook.resolution import (
     resolution_at,
     sample_places,
 )
+from lens_examples import EXAMPLES
 
 DEGREE = np.pi / 180
 CLOSE = 1e-7  # central differences of 1e-5 rad of pixels below 1e4: rounding errs by less
@@ -173,3 +175,25 @@ def test_an_axis_outside_the_picture_lies_on_its_far_side() -> None:
     assert fields.left == pytest.approx(-10)
     assert fields.right == pytest.approx(60)
     assert fields.horizontal == pytest.approx(50)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_every_model_s_real_lens_is_resolved_wherever_it_sees(model: str) -> None:
+    """Also those with terms that are not round, up to the rim and never beyond it."""
+    example = EXAMPLES[model][0].camera
+    over = over_picture(example, columns=40)
+    seen = np.isfinite(over.theta)
+    assert 0.5 < seen.mean() < 0.9  # a circle in a picture that just holds it
+    for values in (over.resolution.radial, over.resolution.tangential, over.resolution.least):
+        assert (np.isfinite(values) == seen).all()
+        assert (values[seen] > 0).all()
+    slack = 1 + 1e-7
+    assert (over.resolution.least <= over.resolution.tangential * slack)[seen].all()
+    assert (over.resolution.most * slack >= over.resolution.radial)[seen].all()
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_ray_without_direction_has_neither_a_place_nor_a_resolution(model: str) -> None:
+    example = EXAMPLES[model][0].camera
+    assert np.isnan(example.project(np.array([[0.0, 0.0, 0.0], [np.nan] * 3]))).all()
+    assert np.isnan(resolution_at(example, np.full((1, 3), np.nan)).least).all()

@@ -201,9 +201,8 @@ class Camera:
         scale = np.divide(radius, sine, out=np.zeros_like(sine), where=sine > 0)
         point = xy * scale[..., None]
         if isinstance(self.lens, BentLens):
-            point += self.lens.offset(
-                np.where(seen, theta, 0.0), np.arctan2(xy[..., 1], xy[..., 0])
-            )
+            phi = np.arctan2(xy[..., 1], xy[..., 0])  # NaN for a zero ray
+            point += self.lens.offset(np.where(seen, theta, 0.0), np.where(seen, phi, 0.0))
         pixel = np.asarray(self.center) + point @ self.stretch.T
         pixel[~seen] = np.nan
         return np.asarray(pixel)

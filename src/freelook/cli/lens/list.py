@@ -232,7 +232,7 @@ def _folder_table(found: list[Found]) -> Table:
         if each.profile:
             row = _camera_row(each.profile.camera)
             size = f"{row['size'][0]}x{row['size'][1]}"
-            words = "; ".join([f"{each.format} {row['model']}", *each.profile.notes])
+            words = "; ".join([f"{each.format} {row['model']}", *_first(each.profile.notes)])
             table.add_row(escape(each.path), size, f"{row['field_deg']:.1f}", escape(words))
         elif each.format == NO_PROFILE:
             words = each.reason.split("; ")[0]
@@ -241,6 +241,12 @@ def _folder_table(found: list[Found]) -> Table:
             words = f"{each.format}: {each.reason}"
             table.add_row(escape(each.path), "", "", f"[red]{escape(words)}[/red]")
     return table
+
+
+def _first(notes: tuple[str, ...]) -> list[str]:
+    """The first note up to its advice, and how many more there are."""
+    more = f"{len(notes) - 1} more note{'s' if len(notes) > 2 else ''}"
+    return [notes[0].split("; ")[0], *([more] if len(notes) > 1 else [])] if notes else []
 
 
 def _reason_table(found: list[Found]) -> Table | str:
