@@ -20,7 +20,20 @@ from ..errors import ProfileError
 from ._document import LARGEST_BYTES, Document
 from ._profile import Choice, Profile
 
-FORMATS = ("freelook", "opencv", "ocamcalib", "py-ocamcalib", "colmap", "mrcal")
+FORMATS = (
+    "freelook",
+    "opencv",
+    "ros",
+    "kalibr",
+    "basalt",
+    "ocamcalib",
+    "py-ocamcalib",
+    "colmap",
+    "mrcal",
+    "gyroflow",
+    "woodscape",
+    "onvif",
+)
 
 __all__ = [
     "FORMATS",

@@ -19,7 +19,7 @@ from ..errors import ProfileError
 LARGEST = 2**19  # characters; OpenCV writes every corner it saw into its files, which are larger
 DEEPEST = 32
 
-INTEGER = re.compile(r"[-+]?[0-9]+")
+INTEGER = re.compile(r"[-+]?[0-9]{1,400}")  # Python refuses to read thousands of digits
 FLOAT = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
 CONSTANTS = {
     **dict.fromkeys(("", "~", "null", "Null", "NULL")),
@@ -50,7 +50,7 @@ def parse_yaml(text: str) -> Any:
         raise ProfileError(f"not YAML: {error.problem}{where}") from None
     except yaml.YAMLError as error:
         raise ProfileError(f"not YAML: {' '.join(str(error).split())}") from None
-    except ValueError as error:  # an integer of thousands of digits, half a surrogate pair
+    except ValueError as error:  # half a surrogate pair
         raise ProfileError(f"not YAML: {error}") from None
 
 
@@ -115,6 +115,11 @@ def _scalar(event: Any) -> Any:
     text = event.value
     if not event.implicit[0] and event.tag in (None, "!", STANDARD + "str"):  # quoted
         return text
+    return plain_value(text)
+
+
+def plain_value(text: str) -> Any:
+    """Null, true, false, a number, or the text itself."""
     if text in CONSTANTS:
         return CONSTANTS[text]
     if INTEGER.fullmatch(text):
@@ -127,7 +132,7 @@ def _scalar(event: Any) -> Any:
 def _check_tag(event: Any) -> None:
     if event.tag in TAGS:
         return
-    if not (isinstance(event, yaml.MappingStartEvent) and event.tag.startswith(MATRIX)):
+    if not (isinstance(event, yaml.MappingStartEvent) and str(event.tag).startswith(MATRIX)):
         raise ProfileError(f"the YAML tag {event.tag:.80}{_line(event)} is not read here")
 
 
