@@ -372,7 +372,7 @@ FAULTS = [
     (text(intrinsics=[300, 1 + 2j, 320, 240]), r"PINHOLE\[1\] must be a number, not \(1\+2j\)"),
     (
         text(intrinsics=[300, 300, 320, 240]).replace("320", "0x" + "f" * 9000),
-        "not a number a lens",
+        "an integer of more than 64 bits is",
     ),
     (text(intrinsics=[300, 300, 320, 240]).replace("320", "9" * 9000), "not a Python dictionary"),
     (text(intrinsics=[-300, 300, 320, 240]), "focal lengths must be positive"),

@@ -118,6 +118,7 @@ def _dictionary(text: str) -> dict[str, Any]:
             body = ast.parse(text.strip(), mode="eval").body
             if not isinstance(body, ast.Dict):
                 raise ProfileError("not mrcal's: it must be one Python dictionary")
+            _no_giants(body)
             keys = [ast.literal_eval(key) if key else None for key in body.keys]
             values = [ast.literal_eval(value) for value in body.values]
     except SyntaxError as error:
@@ -131,6 +132,14 @@ def _dictionary(text: str) -> dict[str, Any]:
         if not isinstance(key, str) or keys.count(key) > 1:
             raise ProfileError(f"key {key!r:.40} is no name, or is given twice")
     return {str(key): value for key, value in zip(keys, values, strict=True)}
+
+
+def _no_giants(body: ast.Dict) -> None:
+    """Python reads 0xffff... of any length, and then cannot even print it."""
+    for node in ast.walk(body):
+        value = node.value if isinstance(node, ast.Constant) else None
+        if isinstance(value, int) and value.bit_length() > 64:
+            raise ProfileError("an integer of more than 64 bits is no number of a lens")
 
 
 def _lensmodel(data: dict[str, Any]) -> str:
