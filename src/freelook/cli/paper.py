@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
     from ..paper.report import SECTIONS, open_folder, write_report
     from ._bars import bar
 
-    settings = Settings(args.seed, args.draws, threads=os.cpu_count() or 1)
+    settings = Settings(seed=args.seed, draws=args.draws, threads=os.cpu_count() or 1)
     open_folder(args.outdir, overwrite=args.overwrite)
     with bar("paper", len(SECTIONS), "sections") as advance:
         sections = write_report(args.outdir, settings, advance)

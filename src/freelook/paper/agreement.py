@@ -36,7 +36,7 @@ def possible(ranges: Table) -> Table:
 
 def drawn_band() -> Table:
     """What one design leaves of the curve, beside what the rounding alone leaves."""
-    degrees = np.arange(0.0, 91.0, 3.0)
+    degrees = np.arange(0.0, 91.0, 2.0)
     ends = np.array([DRAWN.range_px(theta) for theta in degrees], dtype=np.float64)
     return Table(
         {
@@ -131,8 +131,8 @@ def section(settings: Settings) -> Section:
             f"over all of them, instead of ± {float(half_width_px(np.array(90.0))):.0f}; for "
             f"10 to 90 in steps of 10 (green) between {band['least_px'][-1]:.0f} and "
             f"{band['most_px'][-1]:.0f}. The printed curve, "
-            f"{float(printed.quintic(np.array(90.0))):.0f} there, lies below that: its last two "
-            "coefficients cannot both be as round as they look.",
+            f"{float(printed.quintic(np.array(90.0))):.0f} pixels there, lies below that: then "
+            "it is not the curve that was measured.",
             "If no point was taken near the axis, that can explain why equation 7 falls there. A "
             "simulated experiment from 0 degrees on never gives a quintic that falls by 19 "
             f"pixels ({early.max():.1f} % of {settings.draws} trials even at "

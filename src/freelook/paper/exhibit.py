@@ -31,11 +31,13 @@ class Settings:
     """How much work to put in, and the seed of everything random.
 
     draws       of each Monte Carlo
+    pictures    in which the image circle is sought together
     threads     for drawing simulated pictures
     """
 
     seed: int = 2011
     draws: int = 20_000
+    pictures: int = 8
     threads: int = 2
 
     def rng(self, name: str) -> np.random.Generator:

@@ -71,8 +71,8 @@ def draw(table: Table) -> Figure:
     for model in FIVE:
         axes.plot(size, table[f"{model}_percent"], color=MODEL_COLORS[model], label=model)
     axes.plot(size, table["simulated_percent"], "k.", markersize=4, label="simulated")
-    axes.set(xlim=(0, size[-1]), ylim=(-12, 6))
-    axes.legend(loc="lower left", ncols=2)
+    axes.set(xlim=(0, size[-1]), ylim=(-12, 8))
+    axes.legend(loc="upper right", ncols=3)
     return figure
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from .. import __version__
@@ -10,7 +11,7 @@ from . import printed
 from .exhibit import Exhibit, Section, Settings, Table
 
 FIGURES, NUMBERS = "figures", "numbers"
-LONG = 8  # rows above which a table is folded away
+LONG = 14  # rows above which a table is folded away
 
 INTRODUCTION = (
     "In 2011 Osamah Rawashdeh and Belal Sababha flew an R/C plane with a fixed fisheye camera and "
@@ -64,12 +65,17 @@ def _add_header(body: Element, sections: list[Section]) -> None:
         _add(line, "p", _sentence(section.because), class_="small")
 
 
+def typeset(text: str) -> str:
+    """Minus signs in front of numbers."""
+    return re.sub(r"(?<![\w-])-(?=\d)", "−", text)
+
+
 def _slug(section: Section) -> str:
     return section.verdict.replace(" ", "-")
 
 
 def _sentence(text: str) -> str:
-    return f"{text[0].upper()}{text[1:]}."
+    return typeset(f"{text[0].upper()}{text[1:]}.")
 
 
 def _add_section(main: Element, section: Section) -> None:
@@ -77,17 +83,17 @@ def _add_section(main: Element, section: Section) -> None:
     _add(box, "h2", section.title)
     _add(box, "p", section.places, class_="places")
     _add(box, "h3", "What the paper shows")
-    _add(box, "p", section.paper)
+    _add(box, "p", typeset(section.paper))
     _add(box, "h3", "What we get")
     for paragraph in section.ours:
-        _add(box, "p", paragraph)
+        _add(box, "p", typeset(paragraph))
     for exhibit in section.exhibits:
         _add_figure(box, exhibit) if exhibit.draw else _add_table(box, exhibit)
     verdict = SubElement(box, "p", {"class": "conclusion"})
     _add(
         verdict, "span", section.verdict, class_=f"verdict {_slug(section)}"
     ).tail = f" {_sentence(section.because)}"
-    _add(_add(box, "p", "", class_="small basis"), "b", "Rests on: ").tail = section.basis
+    _add(_add(box, "p", "", class_="small basis"), "b", "Rests on: ").tail = typeset(section.basis)
 
 
 def _add_figure(box: Element, exhibit: Exhibit) -> None:
@@ -139,7 +145,7 @@ def number(value: float, digits: int) -> str:
     if value and abs(value) < 0.5 * 10.0**-digits and abs(value) < 1e-6:
         return f"{value:.0e}"
     text = f"{value:.{digits}f}"
-    return text.lstrip("-") if float(text) == 0 else text.replace("-", "−")
+    return text.lstrip("-") if float(text) == 0 else typeset(text)
 
 
 def _add_footer(body: Element, settings: Settings) -> None:

@@ -33,13 +33,13 @@ def section(settings: Settings) -> Section:
         "and 420 TV lines; a window of 180 × 144 out of 720 × 576 pixels.",
         ours=(
             f"The sum is ${total_dollars():.2f} (printed without the cents), of which the goggles "
-            f"are {goggles / total_dollars():.0%}. The laptop and the "
+            f"are {100 * goggles / total_dollars():.0f} %. The laptop and the "
             "aircraft are not in it. Only the camera's weight is given, neither the other parts' "
             "nor that of the gimbal it replaces: “less weight” cannot be checked.",
-            f"The window is {window_share():.2%} of the picture, one pixel in sixteen. TV lines "
-            f"are counted over a width equal to the height, so {printed.TV_LINES} of them are "
-            f"{resolved:.0f} over the whole width: the camera resolves {resolved / width:.0%} of "
-            f"the {width} columns, and some {resolved / 4:.0f} of the window's 180.",
+            f"The window is {100 * window_share():.2f} % of the picture, one pixel in sixteen. TV "
+            f"lines are counted over a width equal to the height, so {printed.TV_LINES} of them "
+            f"are {resolved:.0f} over the whole width: the camera resolves "
+            f"{100 * resolved / width:.0f} % of the {width} columns, and some {resolved / 4:.0f} of the window's 180.",
             "“The operator does not notice a delay” was not measured. What freelook adds can be: "
             "see freelook bench latency.",
         ),

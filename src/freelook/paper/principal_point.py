@@ -20,7 +20,6 @@ from .drawing import WIDTH_IN
 from .exhibit import Exhibit, Section, Settings, Table
 
 NOISE_LEVELS = 4.0  # grey levels of 255, 1 sigma, in every pixel: analogue video
-PICTURES = 8
 EVERY_S = 9
 
 
@@ -36,12 +35,12 @@ def cut_camera() -> Camera:
     )
 
 
-def pictures(camera: Camera, settings: Settings, count: int) -> list[Plane]:
+def pictures(camera: Camera, settings: Settings) -> list[Plane]:
     """Luma of frames along the simulated flight, with noise."""
     simulated = SimulatedCamera(camera, World(pixel_deg(camera)), threads=settings.threads)
     rng = settings.rng("principal_point")
     frames = []
-    for index in range(count):
+    for index in range(settings.pictures):
         luma = simulated.picture(index * EVERY_S * NS_PER_S).planes[0]
         noisy = luma + rng.normal(0, NOISE_LEVELS, luma.shape)
         frames.append(np.clip(np.rint(noisy), 0, 255).astype(np.uint8))
@@ -71,12 +70,12 @@ def cases_table(cases: list[Case]) -> Table:
         {
             "pictures": [case.name for case in cases],
             "x0 found": [circle.center[0] for circle in found],
-            "true": [case.camera.center[0] for case in cases],
+            "x0 true": [case.camera.center[0] for case in cases],
             "y0 found": [circle.center[1] for circle in found],
-            "true ": [case.camera.center[1] for case in cases],
+            "y0 true": [case.camera.center[1] for case in cases],
             "standard error": [circle.center_error_px for circle in found],
             "radius found": [circle.radius_px for circle in found],
-            "true  ": [case.true_radius_px for case in cases],
+            "radius true": [case.true_radius_px for case in cases],
             "ky / kx found": [circle.aspect for circle in found],
         }
     )
@@ -87,19 +86,19 @@ def edge_table(circle: ImageCircle) -> Table:
 
 
 def section(settings: Settings) -> Section:
-    whole, cut = rig.camera(), cut_camera()
-    frames, cut_frames = (pictures(camera, settings, PICTURES) for camera in (whole, cut))
+    whole, cut, count = rig.camera(), cut_camera(), settings.pictures
+    frames, cut_frames = (pictures(camera, settings) for camera in (whole, cut))
     cases = [
         Case("1, whole circle", whole, find_circle(frames[:1])),
-        Case(f"{PICTURES}, whole circle", whole, find_circle(frames)),
-        Case(f"{PICTURES}, circle cut above and below", cut, find_circle(cut_frames)),
+        Case(f"{count}, whole circle", whole, find_circle(frames)),
+        Case(f"{count}, cut circle", cut, find_circle(cut_frames)),
     ]
     circle = cases[1].found
     shown = frames[0]
 
     @style()
     def draw(table: Table) -> Figure:
-        figure = new_figure(WIDTH_IN, 4.6)
+        figure = new_figure(WIDTH_IN, 4.35)
         axes = panel(figure.add_subplot(), "Edges found", "x, pixels", "y, pixels")
         axes.imshow(shown, cmap="gray", vmin=0, vmax=255, aspect=1 / rig.PIXEL_ASPECT)
         axes.plot(table["x_px"], table["y_px"], ".", color=AMBER, markersize=3)
@@ -117,7 +116,7 @@ def section(settings: Settings) -> Section:
         ours=(
             "freelook's circle finder on simulated PAL pictures with a known, slightly off-centre "
             f"axis: the centre is found within {worst:.2f} pixels, from a single picture, from "
-            f"{PICTURES}, and also where the circle is higher than the picture. PAL's pixels make "
+            f"{count}, and also where the circle is higher than the picture. PAL's pixels make "
             "the circle an ellipse; its axes give the ratio ky / kx as well (true: "
             f"{rig.PIXEL_ASPECT:.4f}), without moving a point through known angles. From the "
             "radius and the lens's 188 degrees follows a first profile: freelook lens "
@@ -125,13 +124,13 @@ def section(settings: Settings) -> Section:
         ),
         verdict="holds",
         because="the centre of the circle is the principal point, to a fraction of a pixel, for a "
-        "lens that sits straight; where it is tilted nothing here says so",
+        "lens that sits straight before its sensor",
         basis=f"Simulation: frames of the flight every {EVERY_S} s, noise of {NOISE_LEVELS:g} "
         "grey levels (1 sigma) in every pixel.",
         exhibits=(
             Exhibit(
                 "principal_point",
-                f"What the finder used in {PICTURES} pictures (one of them is shown).",
+                f"What the finder used in {count} pictures (one of them is shown).",
                 edge_table(circle),
                 draw,
                 picture=True,

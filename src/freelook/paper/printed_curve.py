@@ -121,14 +121,13 @@ def section(settings: Settings) -> Section:
             f"{printed.QUINTIC[1]:.4f} ± 0.00005 pixels per degree.",
             "Away from the axis the print has too few digits. Half a unit in the last place of "
             f"every coefficient adds up to ± {off[30.0]:.0f} pixels at 30 degrees, "
-            f"± {off[60.0]:.0f} at 60 and ± {off[90.0]:.0f} at 90: the grey band. That the "
-            "printed curve stays near the line all the same is luck, or the coefficients happen "
-            "to be round. Nobody can rebuild the measured curve beyond some 40 degrees from it.",
+            f"± {off[60.0]:.0f} at 60 and ± {off[90.0]:.0f} at 90: the grey band. The "
+            "measured curve cannot be rebuilt from equation 7 beyond some 40 degrees.",
             f"Nor is p what the text calls it, a distance from the centre of the frame: it is "
             f"{printed.LINE[0]:.0f} pixels, not 0, where the target is at the centre, and "
             f"{float(printed.line(np.array(90.0))):.0f} at 90 degrees in a picture "
-            f"{printed.PICTURE_SIZE[0]} pixels wide. It must be a position along a row, counted "
-            "from an edge, and so any lens model fitted to it needs a free offset.",
+            f"{printed.PICTURE_SIZE[0]} pixels wide. It looks like a position along a row, "
+            "counted from an edge; any lens model fitted to it needs a free offset.",
         ),
         verdict="does not hold",
         because="the polynomial falls where it must grow, p is not a distance from the centre, "

@@ -53,14 +53,20 @@ def best_shares(coefficients: Floats, angles_deg: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Support:
-    """Shares (4,) over FISHEYES: of the rounding alone, and of what equation 6 leaves of it,
-    the mean over all possible designs that reach 80 degrees with its least and greatest."""
+    """How often each fisheye model fits best, (4,) over FISHEYES.
+
+    rounding    share of the curves within the rounding of equation 7
+    together    share of those that equation 6 allows too, mean over the sets of angles
+    leads       in how many sets of angles it has the largest share
+    """
 
     rounding: Floats
-    mean: Floats
-    least: Floats
-    most: Floats
-    designs: int
+    together: Floats
+    leads: Floats
+
+    @property
+    def sets(self) -> int:
+        return int(self.leads.sum())
 
 
 def few(settings: Settings) -> int:
@@ -69,7 +75,10 @@ def few(settings: Settings) -> int:
 
 
 def support(settings: Settings, last_deg: int) -> Support:
-    """Judged at the angles that may have been measured, up to `last_deg`."""
+    """Judged at the angles that may have been measured, up to `last_deg`.
+
+    Sets of angles: those that leave both printed equations true and reach 80 degrees.
+    """
     rng = settings.rng("printed_models")
     anywhere = within_rounding(rng, settings.draws)
     shares = []
@@ -81,14 +90,9 @@ def support(settings: Settings, last_deg: int) -> Support:
         if len(allowed):
             shares.append(best_shares(allowed, angles))
     each = np.array(shares)
+    leads = np.bincount(np.argmax(each, axis=1), minlength=len(FISHEYES)).astype(np.float64)
     reach = Design(10, last_deg, 5).angles_deg
-    return Support(
-        best_shares(anywhere, reach),
-        each.mean(axis=0),
-        each.min(axis=0),
-        each.max(axis=0),
-        len(each),
-    )
+    return Support(best_shares(anywhere, reach), each.mean(axis=0), leads)
 
 
 def fit_table(design: Design, models: tuple[str, ...]) -> Table:
@@ -128,18 +132,15 @@ def draw(table: Table) -> Figure:
 
 
 def shares_table(near: Support, whole: Support) -> Table:
-    percent = {
-        "whole rounding": whole.rounding,
-        "both eqs mean": whole.mean,
-        "least": whole.least,
-        "most": whole.most,
-        "below 60 rounding": near.rounding,
-        "below 60 both eqs": near.mean,
-    }
     return Table(
         {
-            "model fits best, %": list(FISHEYES),
-            **{name: 100 * values for name, values in percent.items()},
+            "model": list(FISHEYES),
+            "rounding of (7), %": 100 * whole.rounding,
+            "(6) and (7), %": 100 * whole.together,
+            "leads in sets": whole.leads,
+            "to 60°: (7), %": 100 * near.rounding,
+            "to 60°: both, %": 100 * near.together,
+            "to 60°: leads": near.leads,
         }
     )
 
@@ -158,7 +159,8 @@ def section(settings: Settings) -> Section:
     shares = shares_table(share[60], share[90])
     rms = dict(zip(whole.words["model"], whole["rms px"], strict=True))
     rms_near = dict(zip(near.words["model"], near["rms px"], strict=True))
-    mean = dict(zip(FISHEYES, 100 * share[90].mean, strict=True))
+    together = dict(zip(FISHEYES, 100 * share[90].together, strict=True))
+    leads = dict(zip(FISHEYES, share[90].leads, strict=True))
     f_near = dict(zip(near.words["model"], near["f px"], strict=True))
     bent = bend_px("orthographic", f_near["orthographic"])
     strays = float(np.abs(printed.line(NEAR.angles_deg) - printed.quintic(NEAR.angles_deg)).max())
@@ -179,10 +181,13 @@ def section(settings: Settings) -> Section:
             f"{rms_near['orthographic']:.1f} and {rms_near['stereographic']:.1f}: too close to "
             "tell the first three apart.",
             "How firm is that? Among curves anywhere within the rounding of equation 7 any model "
-            "can come first. Among those that equation 6 allows too (see above), equisolid fits "
-            f"best in {mean['equisolid']:.0f} %, equidistant in {mean['equidistant']:.0f} %, "
-            f"orthographic in {mean['orthographic']:.0f} %, on average over "
-            f"{share[90].designs} sets of angles that reach 80 degrees.",
+            "can come first. Among those that equation 6 allows too (see above) it depends on the "
+            f"angles that were measured: of {share[90].sets} possible sets of angles that reach "
+            f"80 degrees, equisolid leads in {leads['equisolid']:.0f}, equidistant in "
+            f"{leads['equidistant']:.0f}, stereographic in {leads['stereographic']:.0f}, "
+            f"orthographic in {leads['orthographic']:.0f}. Over all of them equisolid fits best in "
+            f"{together['equisolid']:.0f} % of the curves, orthographic in "
+            f"{together['orthographic']:.0f} %.",
             "Linear and orthographic at once? Between 10 and 60 degrees an orthographic lens "
             f"bends away from its best line by up to {bent:.0f} pixels, an equisolid one by "
             f"{bent_best:.0f}, an equidistant one not at all; equation 7 strays from equation 6 by "
@@ -199,7 +204,12 @@ def section(settings: Settings) -> Section:
         f"{settings.draws} draws of the rounding, and up to {few(settings)} of what both equations "
         "allow for each set of angles.",
         exhibits=(
-            Exhibit("eq7_model_residuals", "Fits over 10 to 90 degrees.", residuals(), draw),
+            Exhibit(
+                "eq7_model_residuals",
+                "What the fits over 10 to 90 degrees leave.",
+                residuals(),
+                draw,
+            ),
             Exhibit(
                 "eq7_models_10_90",
                 "Fits over 10 to 90 degrees.",
@@ -214,7 +224,8 @@ def section(settings: Settings) -> Section:
             ),
             Exhibit(
                 "eq7_models_shares",
-                "In how many percent of the curves that the digits allow each model fits best.",
+                "How many of the curves that the printed digits allow each model fits best, to 90 "
+                "and to 60 degrees.",
                 shares,
                 digits=dict.fromkeys(shares.names, 0),
             ),

@@ -232,7 +232,7 @@ def _show(axes: Axes, image: Pixels, aspect: float) -> None:
 
 @style()
 def draw_full(table: Table, image: Pixels, title: str) -> Figure:
-    figure = new_figure(WIDTH_IN, 4.7)
+    figure = new_figure(WIDTH_IN, 4.35)
     axes = panel(figure.add_subplot(), title, "x, pixels", "y, pixels")
     _show(axes, image, 1 / rig.PIXEL_ASPECT)
     names = list(dict.fromkeys(table.words["look"]))
@@ -297,8 +297,8 @@ def section(settings: Settings) -> Section:
             f"What a view costs: {middle:.1f} pixels per degree in the middle, against "
             f"{gimbal:.1f} for the same sensor behind a {RECTIFIED.hfov_deg:.0f} degree lens on a "
             f"gimbal, {gimbal / middle:.1f} times less. The view takes its pixels from "
-            f"{share:.1%} of the picture, the crop from 6.25 %. Across a radius the resolution "
-            "falls from the centre outwards, as the paper says; around it, it grows.",
+            f"{100 * share:.1f} % of the picture, the crop from 6.25 %. Along a radius the "
+            "resolution falls from the centre outwards, as the paper says; across it, it grows.",
             f"The window shows {across:.0f} degrees in this simulation and "
             f"{by_line:.0f} by the slope of equation 6. The goggles show about "
             f"{GOGGLES_DEG:.0f}. So everything looked {by_line / GOGGLES_DEG:.1f} to "
