@@ -349,8 +349,8 @@ def _refined(gray: Gray, grid: Grid) -> Grid:
     for _ in range(12):
         offsets = WINDOW * np.einsum("nij,kj->nki", local, np.stack([u, v], axis=-1))
         patch = _sampled(smooth, pixels[:, None] + offsets).reshape(-1, len(side), len(side))
-        gv, gu = np.gradient(patch, side, side, axis=(1, 2))
-        gu, gv = gu.reshape(len(pixels), -1), gv.reshape(len(pixels), -1)
+        slopes = np.gradient(patch, side, side, axis=(1, 2))
+        gv, gu = (np.asarray(slope).reshape(len(pixels), -1) for slope in slopes)
         a = np.sum(weight * gu * gu, axis=1)
         b = np.sum(weight * gu * gv, axis=1)
         c = np.sum(weight * gv * gv, axis=1)
