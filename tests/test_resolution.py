@@ -28,6 +28,7 @@ from freelook.resolution import (
     places,
     ray_at,
     resolution_at,
+    resolution_towards,
     sample_places,
 )
 from lens_examples import EXAMPLES
@@ -90,6 +91,8 @@ def test_pixels_twice_as_dense_to_the_right() -> None:
     np.testing.assert_allclose(to_the_right.tangential, around, rtol=CLOSE)
     np.testing.assert_allclose(downwards.radial, 200 * DEGREE, rtol=CLOSE)
     np.testing.assert_allclose(downwards.tangential, 2 * around, rtol=CLOSE)
+    on_the_axis = resolution_towards(stretched, np.zeros(2), np.radians([0.0, 90.0]))
+    np.testing.assert_allclose(on_the_axis.radial, np.array([400, 200]) * DEGREE, rtol=CLOSE)
 
 
 def test_what_the_lens_does_not_see_has_no_resolution() -> None:
@@ -165,6 +168,7 @@ def test_an_ordinary_picture_s_fields_are_the_textbook_s() -> None:
     assert fields.vertical == pytest.approx(2 * np.degrees(np.arctan(240 / 400)))
     assert fields.diagonal == pytest.approx(2 * np.degrees(np.arctan(400 / 400)))
     assert fields.circle == pytest.approx(fields.diagonal)
+    assert fields.corner == pytest.approx(45)
 
 
 def test_an_axis_outside_the_picture_lies_on_its_far_side() -> None:

@@ -59,7 +59,12 @@ def ray_at(theta: Floats, phi: Floats) -> Floats:
 
 def resolution_at(camera: Camera, ray: Floats) -> Resolution:
     """Pixels per degree at rays (..., 3) of any length; NaN where the lens does not see."""
-    theta, phi = angles(ray)
+    return resolution_towards(camera, *angles(ray))
+
+
+def resolution_towards(camera: Camera, theta: Floats, phi: Floats) -> Resolution:
+    """The same at angles; on the axis itself "away from it" is then towards `phi`."""
+    theta, phi = np.broadcast_arrays(theta, phi)
     slopes = _slopes(camera, np.minimum(theta, camera.theta_max - 2 * STEP_RAD), phi)
     slopes = np.where((theta <= camera.theta_max + 1e-9)[..., None, None], slopes, np.nan)
     per_degree = np.radians(1.0) * slopes
@@ -164,6 +169,7 @@ class Fields:
                               comes first; negative for an edge on the far side of the axis
     horizontal, vertical      from edge to edge
     diagonal                  from corner to opposite corner past the centre, the wider of the two
+    corner                    from the axis to the farthest corner
     circle                    the whole field, also where it lies outside the picture
     """
 
@@ -172,6 +178,7 @@ class Fields:
     top: float
     bottom: float
     diagonal: float
+    corner: float
     circle: float
 
     @property
@@ -197,6 +204,7 @@ def fields_of_view(camera: Camera) -> Fields:
         top=float(top if camera.center[1] >= ends_y[0] else -top),
         bottom=float(bottom if camera.center[1] <= ends_y[1] else -bottom),
         diagonal=float(max(one + four, two + three)),
+        corner=float(max(one, two, three, four)),
         circle=float(np.degrees(2 * camera.theta_max)),
     )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib import patheffects
 from matplotlib.axes import Axes
+from matplotlib.image import AxesImage
 from scipy.spatial.transform import Rotation
 
 from ..camera import Camera
@@ -14,6 +15,14 @@ from ..viewport import Viewport
 from ._style import INK
 
 RINGS_DEG = (30, 60, 90)
+
+
+def color_bar(axes: Axes, shown: AxesImage, label: str, extend: str = "neither") -> None:
+    """As high as the picture, beside it."""
+    figure = axes.get_figure()
+    assert figure is not None
+    beside = axes.inset_axes((1.03, 0, 0.04, 1))
+    figure.colorbar(shown, cax=beside, label=label, extend=extend)
 
 
 def draw_rings(axes: Axes, camera: Camera, color: str = "white") -> None:

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from ..camera import Camera
 from ..comparison import Comparison, Difference, Numbers, ring
 from ..lens import Floats
-from ._picture import draw_rings
+from ._picture import color_bar, draw_rings
 from ._style import BLUE, ERRORS, INK, ORANGE, new_figure, panel, picture_panel, style
 
 ARROWS = 17  # along the longer side
@@ -49,9 +49,7 @@ def draw_map(
     shown = axes.imshow(
         distance, cmap=ERRORS, vmin=0, vmax=top, extent=(-0.5, width - 0.5, height - 0.5, -0.5)
     )
-    figure = axes.get_figure()
-    assert figure is not None
-    figure.colorbar(shown, ax=axes, shrink=0.85, label="distance, pixels", extend="max")
+    color_bar(axes, shown, "distance, pixels", extend="max")
     draw_rings(axes, camera)
     _draw_arrows(axes, found, difference)
 

@@ -19,16 +19,14 @@ from ..resolution import (
     fields_of_view,
     over_picture,
     places,
-    ray_at,
-    resolution_at,
+    resolution_towards,
 )
 from ..viewport import Viewport
-from ._picture import draw_rings, inside_view, outline
+from ._picture import color_bar, draw_rings, inside_view, outline
 from ._style import (
     BLUE,
     COLORS,
     FAINT,
-    INK,
     ORANGE,
     VALUES,
     new_figure,
@@ -109,7 +107,7 @@ def draw_by_angle(axes: Axes, camera: Camera) -> None:
     around; where the picture ends to each side."""
     panel(axes, "Resolution by angle", "angle from the axis, degrees", "pixels per degree")
     theta = np.linspace(0, camera.theta_max, 200)
-    there = resolution_at(camera, ray_at(theta[:, None], around_axis(AROUND)))
+    there = resolution_towards(camera, theta[:, None], around_axis(AROUND))
     for values, color, name in (
         (there.tangential, ORANGE, "around the axis (tangential)"),
         (there.radial, BLUE, "away from it (radial)"),
@@ -155,10 +153,11 @@ def _extent(camera: Camera) -> tuple[float, float, float, float]:
 def draw_over_picture(axes: Axes, camera: Camera, over: PictureMap) -> None:
     """Pixels per degree as colours over the picture, with rings at 30, 60 and 90 degrees."""
     picture_panel(axes, "Resolution over the picture", camera.size)
-    shown = axes.imshow(over.resolution.mean, cmap=VALUES, extent=_extent(camera))
-    figure = axes.get_figure()
-    assert figure is not None
-    figure.colorbar(shown, ax=axes, shrink=0.85, label="pixels per degree (root of the area)")
+    values = over.resolution.mean
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    high = max(high, 1.05 * low)  # or an equisolid lens would show nothing but rounding
+    shown = axes.imshow(values, cmap=VALUES, vmin=low, vmax=high, extent=_extent(camera))
+    color_bar(axes, shown, "pixels per degree (root of the area)")
     draw_rings(axes, camera)
 
 
@@ -178,5 +177,4 @@ def draw_views(axes: Axes, camera: Camera, over: PictureMap, views: Sequence[Nam
         axes.plot(*border.T, color=color, linewidth=2, label=view.name)
     draw_rings(axes, camera, color="#555555")
     if views:
-        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=2)
-    axes.title.set_color(INK)
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, 0), borderaxespad=4.5, ncols=3)

@@ -10,14 +10,14 @@ import numpy as np
 
 from ...camera import Camera
 from ...formats import Profile
-from ...lens import MODELS, BentLens, Floats, growth_limit, model_name, parameters
+from ...lens import MODELS, Floats, growth_limit, model_name, parameters
 from ...resolution import (
     Resolution,
     around_axis,
     fields_of_view,
     inside_picture,
     ray_at,
-    resolution_at,
+    resolution_towards,
 )
 from ...rotations import body_from_view, head_angles_deg
 from ...view_cost import Spot, ViewCost, view_cost
@@ -74,20 +74,13 @@ def _mount(camera: Camera) -> dict[str, float]:
 
 def _fields(camera: Camera) -> dict[str, float]:
     fields = fields_of_view(camera)
-    names = "horizontal", "vertical", "diagonal", "circle", "left", "right", "top", "bottom"
-    return {name: float(getattr(fields, name)) for name in names}
+    names = "horizontal vertical diagonal circle left right top bottom corner"
+    return {name: float(getattr(fields, name)) for name in names.split()}
 
 
 def _residuals(camera: Camera) -> dict[str, float | None]:
     grid = camera.grid.residual_px if camera.grid else None
     return {"table": camera.table.residual_px, "grid": grid}
-
-
-def is_round(camera: Camera) -> bool:
-    """Whether the resolution is the same all around the axis."""
-    return not isinstance(camera.lens, BentLens) and bool(
-        np.allclose(camera.stretch, camera.stretch[0, 0] * np.eye(2), atol=1e-9)
-    )
 
 
 def _resolutions(camera: Camera) -> list[dict[str, Any]]:
@@ -100,7 +93,7 @@ def _resolutions(camera: Camera) -> list[dict[str, Any]]:
 def _ring(camera: Camera, angle_deg: float) -> dict[str, Any]:
     theta = min(np.radians(angle_deg), camera.theta_max * (1 - 1e-12))
     ray = ray_at(np.array(theta), around_axis(AROUND))
-    there = resolution_at(camera, ray)
+    there = resolution_towards(camera, np.array(theta), around_axis(AROUND))
     return {
         "radial": float(there.radial.mean()),
         "tangential": float(there.tangential.mean()),
@@ -113,7 +106,7 @@ def _ring(camera: Camera, angle_deg: float) -> dict[str, Any]:
 def along(camera: Camera, count: int) -> tuple[Floats, Resolution]:
     """(radius in pixels, resolution to the right) at even steps of the angle, axis to rim."""
     theta = np.linspace(0, camera.theta_max * (1 - 1e-12), count)
-    return camera.lens.radius(theta), resolution_at(camera, ray_at(theta, np.zeros(1)))
+    return camera.lens.radius(theta), resolution_towards(camera, theta, np.zeros(1))
 
 
 def _view(camera: Camera, view: View) -> dict[str, Any]:

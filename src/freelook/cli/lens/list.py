@@ -131,7 +131,7 @@ def _entries(title: str, entries: Iterable[tuple[str, list[str]]]) -> Table:
 
 def _profile_words(row: dict[str, Any]) -> tuple[str, list[str]]:
     width, height = row["size"]
-    camera = f"{row['model']}, {width} x {height}, field {row['field_deg']:g} degrees"
+    camera = f"{row['model']}, {width} x {height}, field {row['field_deg']:.4g} degrees"
     return row["profile"], [row["name"], camera, row["source"]]
 
 

@@ -119,7 +119,7 @@ def _print(facts: dict[str, Any], camera: Camera) -> None:
     for note in facts["notes"]:
         console.print(f"note: {note}", style="yellow", highlight=False, markup=False)
     console.print(_lens_table(facts, camera, sparks=console.encoding.lower().startswith("utf")))
-    console.print(_resolution_table(facts["pixels_per_degree"]))
+    console.print(_resolution_table(facts["pixels_per_degree"], facts["field_deg"]["corner"]))
     console.print(_view_table(facts["views"]))
 
 
@@ -189,7 +189,7 @@ def _residual(residual: dict[str, float | None]) -> str:
     return words
 
 
-def _resolution_table(rows: list[dict[str, Any]]) -> Table:
+def _resolution_table(rows: list[dict[str, Any]], corner_deg: float) -> Table:
     from rich.table import Table
 
     table = Table(title="pixels per degree", title_justify="left")
@@ -200,7 +200,8 @@ def _resolution_table(rows: list[dict[str, Any]]) -> Table:
         name = row["where"] if row["where"] in ("centre", "rim") else ""
         where = f"{row['angle_deg']:.4g} degrees" + (f", {name}" if name else "")
         if row["share_in_picture"] == 0:
-            where += " (outside the picture)"
+            outside = row["angle_deg"] > corner_deg + 0.01
+            where += " (outside the picture)" if outside else " (in a corner)"
         cells = [digits(row["radial"], ".2f"), digits(row["tangential"], ".2f")]
         table.add_row(where, *cells, span((row["least"], row["most"])))
     return table
