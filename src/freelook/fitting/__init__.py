@@ -8,5 +8,16 @@ refit.py    a camera of another model that projects as nearly the same as it can
 from __future__ import annotations
 
 from .curve import CurveFit, curve_models, fit_curve, rank
+from .points import PointFit, fit_points
+from .refit import Refit, refit
 
-__all__ = ["CurveFit", "curve_models", "fit_curve", "rank"]
+__all__ = [
+    "CurveFit",
+    "PointFit",
+    "Refit",
+    "curve_models",
+    "fit_curve",
+    "fit_points",
+    "rank",
+    "refit",
+]

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..lens import BentLens, Floats, Lens, vector
-from ._minimum import Minimum, minimise
+from ._minimum import CLOSE, Minimum, minimise
 from ._models import CELLS, LEAST_SLOPE, Bools, free_names, lens_with, radius_of, slope_shortfall
 
 # Which entries of the stretch are sought; xx stays as it is, for the lens has its own scale.
@@ -111,7 +111,14 @@ class CameraProblem:
         return self.pixel - self.project(x)
 
     def fit(
-        self, start: Floats, theta_max: float, *, loss: str, least_slope: float = LEAST_SLOPE
+        self,
+        start: Floats,
+        theta_max: float,
+        *,
+        loss: str,
+        scale: float | None = None,
+        least_slope: float = LEAST_SLOPE,
+        effort: tuple[float, int] = CLOSE,
     ) -> Minimum:
         """The minimum from a start on, held to lenses that grow to theta_max (radians)."""
 
@@ -126,7 +133,9 @@ class CameraProblem:
             start,
             size=self.size_px,
             loss=loss,
+            scale=scale,
             constraints=shortfall,
+            effort=effort,
         )
 
     @property

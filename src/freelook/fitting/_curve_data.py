@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import FitError
 from ..lens import Floats, Lens, vector
-from ._minimum import Minimum, minimise
+from ._minimum import CLOSE, Minimum, minimise
 from ._models import (
     CELLS,
     LEAST_SLOPE,
@@ -143,7 +143,7 @@ class CurveProblem:
         *,
         scale: float | None = None,
         least_slope: float = LEAST_SLOPE,
-        rough: bool = False,
+        effort: tuple[float, int] = CLOSE,
     ) -> Minimum:
         """The minimum from a start on, held to lenses that grow to theta_max."""
         data = self.data
@@ -163,5 +163,5 @@ class CurveProblem:
             loss=data.loss,
             scale=scale,
             constraints=shortfall,
-            rough=rough,
+            effort=effort,
         )

@@ -17,7 +17,9 @@ Function = Callable[[Floats], Floats]
 # Residuals of this many standard deviations are where a robust loss begins to differ from least
 # squares: soft_l1 then keeps about 95 % of the efficiency on normal noise.
 TURN = 1.5
-ROUGH, CLOSE = 1e-4, 1e-11  # where to stop, relative
+# Where to stop, relatively, and after how many steps at the latest: to tell the deepest of several
+# valleys, to see what leaving points out does, to have the answer.
+ROUGH, FAIR, CLOSE = (1e-4, 20), (1e-7, 40), (1e-11, 100)
 LOSSES = ("linear", "soft_l1", "cauchy")
 
 
@@ -91,7 +93,7 @@ def minimise(
     loss: str = "linear",
     scale: float | None = None,
     constraints: Function | None = None,
-    rough: bool = False,
+    effort: tuple[float, int] = CLOSE,
 ) -> Minimum:
     """The parameters that make `values` smallest, from `start` on.
 
@@ -101,7 +103,7 @@ def minimise(
     loss         "linear" for least squares, "soft_l1" or "cauchy" against outliers
     scale        where the loss turns; None: 1.5 robust standard deviations of the residuals,
                  found along the way
-    rough        only near enough to tell which of several valleys is the deepest
+    effort       ROUGH, FAIR or CLOSE
     constraints  parameters to values that should be 0; plain squares, whatever the loss
 
     FitError when the start makes no sense or the loss is unknown.
@@ -109,16 +111,16 @@ def minimise(
     if loss not in LOSSES:
         raise FitError(f"unknown loss '{loss}'; known: {', '.join(LOSSES)}")
     problem = _Problem(values, constraints, np.asarray(start, dtype=float), size)
-    tolerance = ROUGH if rough else CLOSE
     if loss == "linear":
-        return problem.minimum(problem.solve(problem.start, loss, 1.0, tolerance), loss, 1.0)
+        x = problem.solve(problem.start, loss, 1.0, effort)
+        return problem.minimum(problem.polished(x) if effort == CLOSE else x, loss, 1.0)
     x, turn = problem.start, scale or problem.turn(problem.start)
-    for _ in range(2 if rough else 12 if scale is None else 0):
+    for _ in range(0 if scale else 2 if effort == ROUGH else 12):
         x = problem.solve(x, loss, turn, ROUGH)
         last, turn = turn, problem.turn(x)
         if abs(turn - last) <= 0.02 * last:
             break
-    return problem.minimum(problem.solve(x, loss, turn, tolerance), loss, turn)
+    return problem.minimum(problem.solve(x, loss, turn, effort), loss, turn)
 
 
 def spread(values: Floats, parameters: int = 0) -> float:
@@ -162,7 +164,7 @@ class _Problem:
         """Where a robust loss turns, by the residuals there."""
         return max(1e-9 * self._size, TURN * spread(self.values(x), len(x)))
 
-    def solve(self, x: Floats, loss: str, turn: float, tolerance: float) -> Floats:
+    def solve(self, x: Floats, loss: str, turn: float, effort: tuple[float, int]) -> Floats:
         def rho(z: Floats) -> Floats:
             terms = np.stack(_loss(loss, z))
             plain = z[self._count :]
@@ -176,12 +178,30 @@ class _Problem:
                 jac=lambda y: self._jacobian(x + y * self._unit) / turn,
                 x_scale="jac",
                 loss=rho if loss != "linear" else "linear",
-                ftol=tolerance,
-                xtol=tolerance,
+                ftol=effort[0],
+                xtol=effort[0],
                 gtol=1e-15,
-                max_nfev=20 if tolerance == ROUGH else 100,
+                max_nfev=effort[1],
             )
         return np.asarray(x + found.x * self._unit)
+
+    def polished(self, x: Floats) -> Floats:
+        """A few whole Gauss-Newton steps: they go along the long flat valleys of models whose
+        parameters nearly say the same, where trust regions creep."""
+        rows = self._rows(x)
+        for _ in range(20):
+            step = np.linalg.lstsq(self._jacobian(x), -rows, rcond=1e-14)[0]
+            for part in (1.0, 0.3, 0.1):
+                changed = self._rows(x + part * step * self._unit)
+                if changed @ changed < rows @ rows:
+                    break
+            else:
+                return x
+            better = 1 - (changed @ changed) / (rows @ rows)
+            x, rows = x + part * step * self._unit, changed
+            if better < 1e-6:
+                break
+        return x
 
     def minimum(self, x: Floats, loss: str, turn: float) -> Minimum:
         jacobian = self._jacobian(x)[: self._count] / self._unit

@@ -102,21 +102,24 @@ def growth_end(lens: Lens, theta_max: float) -> float:
     return limit if np.isfinite(ends).all() else 0.0
 
 
+def check_end(model: str, theta_max: float) -> None:
+    """FitError if no lens of a model goes as far as the data do."""
+    ends = np.pi / 2 if model in (*RECTILINEAR, "orthographic") else np.pi
+    if theta_max > ends - (1e-6 if model in RECTILINEAR else -1e-6):
+        raise FitError(
+            f"{model} lenses end at {np.degrees(ends):.0f} degrees from the axis; the data go to "
+            f"{np.degrees(theta_max):.2f}"
+        )
+
+
 def check_growth(lens: Lens, theta_max: float, model: str) -> None:
     """FitError if a fitted lens ends, or stops growing, before theta_max (radians)."""
-    if grows(lens, theta_max):
-        return
-    end, last = np.degrees(growth_end(lens, theta_max)), np.degrees(theta_max)
-    always = isinstance(getattr(type(lens), "hard_limit", None), float)
-    if lens.hard_limit < theta_max and always:
+    if not grows(lens, theta_max):
         raise FitError(
-            f"a {model} lens ends at {np.degrees(lens.hard_limit):.0f} degrees from the axis; "
-            f"the data go to {last:.2f}"
+            f"the {model} lens that comes nearest ends or stops growing at "
+            f"{np.degrees(growth_end(lens, theta_max)):.2f} degrees from the axis; the data go to "
+            f"{np.degrees(theta_max):.2f}"
         )
-    raise FitError(
-        f"the {model} lens that comes nearest ends or stops growing at {end:.2f} degrees from "
-        f"the axis; the data go to {last:.2f}"
-    )
 
 
 def round_parameters(lens: Lens, theta: Floats) -> Bools:

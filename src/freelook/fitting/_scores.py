@@ -15,6 +15,7 @@ import numpy as np
 from scipy.special import gammaln
 
 from ..lens import Floats
+from ._minimum import Minimum, spread
 
 TAIL = 5.0
 
@@ -24,17 +25,74 @@ def log_likelihood(residuals: Floats, loss: str, floor: float) -> float:
     return _normal(residuals, floor) if loss == "linear" else _student(residuals, floor)
 
 
-def aic(log_l: float, k: int) -> float:
-    return 2 * k - 2 * log_l
+class Scored:
+    """What a fit says about its parameters and about itself, from the minimum it ended in."""
 
+    names: tuple[str, ...]
+    _minimum: Minimum
 
-def aicc(log_l: float, k: int, n: int) -> float:
-    """AIC for few points; infinite where there are too few to tell."""
-    return aic(log_l, k) + 2 * k * (k + 1) / (n - k - 1) if n > k + 1 else float("inf")
+    @property
+    def _log_likelihood(self) -> float:
+        raise NotImplementedError
 
+    @property
+    def values(self) -> dict[str, float]:
+        """The fitted parameters by name."""
+        return dict(zip(self.names, map(float, self._minimum.x), strict=True))
 
-def bic(log_l: float, k: int, n: int) -> float:
-    return float(k * np.log(n) - 2 * log_l)
+    @property
+    def covariance(self) -> Floats:
+        """(p, p) of the fitted parameters; the size of the noise is taken from the residuals."""
+        return self._minimum.covariance
+
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """Parameters that the data do not determine."""
+        pairs = zip(self.names, self._minimum.undetermined, strict=True)
+        return tuple(name for name, so in pairs if so)
+
+    @property
+    def sigma(self) -> dict[str, float]:
+        """Standard deviations of the parameters; infinite where the data do not determine one."""
+        sigma = np.sqrt(np.diag(self.covariance))
+        unknown = self._minimum.undetermined
+        pairs = zip(self.names, np.where(unknown, np.inf, sigma), strict=True)
+        return {name: float(value) for name, value in pairs}
+
+    @property
+    def forced(self) -> bool:
+        """Whether the data alone would want a radius that stops growing, and it was kept growing.
+
+        The parameters' uncertainty means little then.
+        """
+        return self._minimum.forced
+
+    @property
+    def noise_px(self) -> float:
+        """The standard deviation of most residuals, per coordinate; outliers do not count."""
+        return spread(self._residuals, len(self.names))
+
+    @property
+    def aic(self) -> float:
+        return 2 * self._k - 2 * self._log_likelihood
+
+    @property
+    def aicc(self) -> float:
+        """AIC corrected for few points; infinite where there are too few to tell."""
+        k, n = self._k, len(self._residuals)
+        return self.aic + 2 * k * (k + 1) / (n - k - 1) if n > k + 1 else float("inf")
+
+    @property
+    def bic(self) -> float:
+        return float(self._k * np.log(len(self._residuals)) - 2 * self._log_likelihood)
+
+    @property
+    def _residuals(self) -> Floats:
+        return self._minimum.values
+
+    @property
+    def _k(self) -> int:
+        return self._minimum.rank + 1
 
 
 def _normal(residuals: Floats, floor: float) -> float:

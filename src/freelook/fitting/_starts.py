@@ -13,10 +13,11 @@ from ._models import default_lens, lens_with, radius_of, scaled
 def starting_curves(
     model: str, data: CurveData, knots: int | None = None, most: int = 3
 ) -> list[tuple[Lens, float]]:
-    """The best few of some simple lenses of a model, with offsets in pixels, best first.
+    """A few simple lenses of a model, with offsets in pixels.
 
-    They have the scale that suits the measured radii and all other parameters at their defaults,
-    or one of them changed: some models have more than one valley to end in.
+    They have the scale that suits the measured radii; all other parameters of the first are at
+    their defaults; the others, the best of many, have one of them changed: some models have more
+    than one valley to end in.
     """
     found = [
         start
@@ -25,8 +26,10 @@ def starting_curves(
     ]
     if not found:
         raise FitError(f"no {model} lens comes near these radii; do they grow with the angle?")
+    plain = found[0]  # all at their defaults
     found.sort(key=lambda start: start[0])
-    return [(lens, offset) for _, lens, offset in found[:most]]
+    kept = [plain, *(start for start in found[:most] if start is not plain)]
+    return [(lens, offset) for _, lens, offset in kept]
 
 
 def _shapes(model: str, data: CurveData, knots: int | None) -> list[Lens]:

@@ -9,11 +9,11 @@ from functools import cached_property
 import numpy as np
 
 from ..errors import FitError
-from ..lens import MODELS, Floats, Lens
+from ..lens import MODELS, Floats, Lens, vector
 from ._curve_data import CurveData, CurveProblem, checked
-from ._minimum import Minimum, spread
-from ._models import LEAST_SLOPE, check_growth, grows, known_model, radius_of
-from ._scores import aic, aicc, bic
+from ._minimum import FAIR, ROUGH, Minimum, spread
+from ._models import LEAST_SLOPE, check_end, check_growth, grows, known_model, radius_of
+from ._scores import Scored
 from ._starts import starting_curves
 
 # With more points than this, ten groups are left out in turn instead of single points.
@@ -33,31 +33,24 @@ def curve_models() -> list[str]:
 
 
 @dataclass(frozen=True)
-class CurveFit:
+class CurveFit(Scored):
     """A lens fitted to p(theta) = offset + r(theta).
 
     model         its name in `MODELS`
     lens          the lens; parameters that do not change its radius are at their defaults
     offset_px     where the axis is on the scale of the measured positions; 0 if not asked for
     names         the fitted parameters, `offset_px` last if it is one of them; those of lists
-                  are numbered, as in coefficients[0]
-    covariance    (p, p) of those; the size of the noise is taken from the residuals
-    undetermined  those among them that the data do not determine
+                  are numbered, as in radii_px[0]; `values`, `sigma`, `covariance` in that order
     residuals_px  (n,) measured minus fitted, in the order given
     theta_max     the largest angle measured, radians
-    forced        the data alone would want a radius that stops growing, and it was kept growing:
-                  the parameters' uncertainty means little then
     """
 
     model: str
     lens: Lens
     offset_px: float
     names: tuple[str, ...]
-    covariance: Floats
-    undetermined: tuple[str, ...]
     residuals_px: Floats
     theta_max: float
-    forced: bool
     _problem: CurveProblem = field(repr=False)
     _minimum: Minimum = field(repr=False)
 
@@ -69,33 +62,6 @@ class CurveFit:
     def noise_px(self) -> float:
         """The standard deviation of most residuals; outliers do not count."""
         return spread(self.residuals_px, len(self.names))
-
-    @property
-    def aic(self) -> float:
-        return aic(self._log_likelihood, self._k)
-
-    @property
-    def aicc(self) -> float:
-        """AIC corrected for few points: what `rank` goes by."""
-        return aicc(self._log_likelihood, self._k, len(self.residuals_px))
-
-    @property
-    def bic(self) -> float:
-        return bic(self._log_likelihood, self._k, len(self.residuals_px))
-
-    @property
-    def values(self) -> dict[str, float]:
-        """The fitted parameters by name."""
-        return dict(zip(self.names, map(float, self._minimum.x), strict=True))
-
-    @property
-    def sigma(self) -> dict[str, float]:
-        """Their standard deviations; infinite where the data do not determine one."""
-        sigma = np.sqrt(np.diag(self.covariance))
-        return {
-            name: float("inf") if name in self.undetermined else float(value)
-            for name, value in zip(self.names, sigma, strict=True)
-        }
 
     def __call__(self, theta: Floats) -> Floats:
         """The fitted position at angles in radians (negative: the other side), pixels."""
@@ -132,7 +98,9 @@ class CurveFit:
             out = np.zeros(n, bool)
             out[order[group::groups]] = True
             seen = replace(self._problem, data=data.part(~out))
-            found = seen.fit(self._minimum.x, self.theta_max, scale=self._minimum.scale)
+            found = seen.fit(
+                self._minimum.x, self.theta_max, scale=self._minimum.scale, effort=FAIR
+            )
             residuals[out] = replace(seen, data=data.part(out)).residuals_px(found.x)
         return residuals
 
@@ -140,10 +108,6 @@ class CurveFit:
     def cv_rms_px(self) -> float:
         """Root mean square of `cv_residuals_px`: how well unmeasured points are predicted."""
         return float(np.sqrt(np.mean(self.cv_residuals_px**2)))
-
-    @property
-    def _k(self) -> int:
-        return self._minimum.rank + 1
 
     @cached_property
     def _log_likelihood(self) -> float:
@@ -178,6 +142,7 @@ def fit_curve(
     if model in NOT_CURVES:
         raise FitError(f"{model} cannot be fitted to a curve; {NOT_CURVES[model]}")
     data = checked(theta, radius_px, sigma_px, free_offset, loss)
+    check_end(model, data.theta_max)
     problem, found = best_curve(model, data)
     lens, found = _growing(model, problem, found)
     return CurveFit(
@@ -185,11 +150,8 @@ def fit_curve(
         lens=lens,
         offset_px=problem.offset_px(found.x),
         names=problem.names,
-        covariance=found.covariance,
-        undetermined=tuple(n for n, u in zip(problem.names, found.undetermined, strict=True) if u),
         residuals_px=problem.residuals_px(found.x),
         theta_max=data.theta_max,
-        forced=found.forced,
         _problem=problem,
         _minimum=found,
     )
@@ -206,12 +168,27 @@ def best_curve(
     p, n = len(starts[0][0].names), len(data.theta)
     if n <= p:
         raise FitError(f"{model} has {p} parameters here; it needs {p + 1} points, not {n}")
+    starts += [_simpler(*starts[0])]
     ends = [
-        (problem, problem.fit(problem.start(problem.like, offset), data.theta_max, rough=True))
+        (problem, problem.fit(problem.start(problem.like, offset), data.theta_max, effort=ROUGH))
         for problem, offset in starts
     ]
     problem, found = max(ends, key=lambda end: end[0].log_likelihood(end[1]))
     return problem, problem.fit(found.x, data.theta_max)
+
+
+def _simpler(problem: CurveProblem, offset: float) -> tuple[CurveProblem, float]:
+    """A start where the correcting terms, those that are 0 by default, are 0 and the rest fits.
+
+    A model's simple kinds are found exactly from there, along no valley at all.
+    """
+    main = problem.free & (vector(problem.like) != 0)
+    simple = replace(problem, free=main)
+    found = simple.fit(simple.start(problem.like, offset), problem.data.theta_max)
+    lens = simple.lens(found.x)
+    if lens is None:
+        return problem, offset
+    return replace(problem, like=lens), simple.offset_px(found.x)
 
 
 def rank(fits: Sequence[CurveFit]) -> list[CurveFit]:

@@ -28,6 +28,7 @@ from .splined import refit_splined
 LIMIT_SHARE = 0.5e-3
 COLUMNS_FIT, COLUMNS_CHECK = 36, 150
 KNOTS = 32
+HOPELESS = 0.01  # of the picture: a lens that far off is not worth more tries
 LEAST_FIELD = np.radians(1.0)
 
 
@@ -173,7 +174,9 @@ def _start(camera: Camera, model: str, end: float) -> Lens:
 def _steeper(problem: CameraProblem, found: Minimum, end: float) -> Minimum:
     """The same from steeper bounds on while the lens stops growing between the cells."""
     for least_slope in (5 * LEAST_SLOPE, 20 * LEAST_SLOPE):
-        lens = problem.lens(found.x)
+        lens, off_px = problem.lens(found.x), np.sqrt(np.mean(found.values**2))
+        if off_px > HOPELESS * problem.size_px:
+            break
         if lens is None or growth_end(lens, end) >= end * (1 - 1e-6):
             break
         found = problem.fit(found.x, end, loss="linear", least_slope=least_slope)
@@ -209,7 +212,7 @@ def _off_deg(new: Camera, rays: Floats, pixel: Floats, off_px: Floats) -> Floats
     outside = np.isnan(angle)
     # just beyond the new rim no ray belongs to a pixel: the degrees that so many pixels are there
     least = resolution_at(new, rays[outside]).least
-    angle[outside] = off_px[outside] / np.maximum(least, 1e-3)
+    angle[outside] = np.minimum(off_px[outside] / np.maximum(least, 1e-3), 180.0)
     return angle
 
 
