@@ -280,7 +280,12 @@ EXAMPLES: dict[str, list[Example]] = {
             ),
             84,
             "ETH3D: its documentation of cameras.txt, 6048 x 4032",
-        )
+        ),
+        Example(
+            ThinPrismFisheye(190.98, 0.0035, 0.0007, 0.0015, -0.001, -0.002, 0.0002, 0.001, -0.002),
+            190,
+            "made up: TUM-VI cam0 above, decentred",
+        ),
     ],
     "rad_tan_thin_prism_fisheye": [
         Example(

@@ -237,29 +237,53 @@ def _angles_of(lens: BentLens, point: Floats, theta_max: float) -> tuple[Floats,
     """(theta, phi) of image points (..., 2) of a lens that is not round; NaN outside the field.
 
     Newton's method in the plane of p, which has no pole inside any field, from the round lens's
-    answer. A point that does not close to 1e-6 px has none.
+    answer, and where that leads nowhere, from the axis. A point that does not close to 1e-6 px
+    has none.
     """
     shape = point.shape[:-1]
-    point = point.reshape(-1, 2)
+    known = np.isfinite(point).all(axis=-1).reshape(-1)
+    point = np.where(known[:, None], point.reshape(-1, 2), 0.0)
     theta = angle_at_radius(lens, np.hypot(point[:, 0], point[:, 1]), theta_max)
     theta = np.where(np.isnan(theta), theta_max, theta)
     phi = np.arctan2(point[:, 1], point[:, 0])
     p = np.tan(theta / 2)[:, None] * np.stack([np.cos(phi), np.sin(phi)], axis=-1)
     reach = min(1.05 * np.tan(theta_max / 2), _reach(lens))
+    p = _newton(lens, point, p, reach)
+    lost = _distance(lens, point, p, reach) > 1e-6
+    if lost.any():
+        p[lost] = _newton(lens, point[lost], np.zeros_like(p[lost]), reach)
+    theta = 2 * np.arctan(np.hypot(p[:, 0], p[:, 1]))
+    closed = known & (_distance(lens, point, p, reach) < 1e-6)
+    theta[~closed | (theta > theta_max + 1e-12)] = np.nan
+    return theta.reshape(shape), np.arctan2(p[:, 1], p[:, 0]).reshape(shape)
+
+
+def _newton(lens: BentLens, point: Floats, p: Floats, reach: float) -> Floats:
+    """p (n, 2), bettered until its image is `point`; steps that make it worse are shortened."""
+    p = p.copy()
     open_ = np.arange(len(p))  # those that have not closed yet
+    part = np.ones(len(p))
     with np.errstate(all="ignore"):  # a point with no answer may send its steps anywhere
-        for _ in range(12):
-            error = point[open_] - _point_at(lens, p[open_], reach)
-            left = np.abs(error).max(axis=-1, initial=0) > 1e-10
+        error = point - _point_at(lens, p, reach)
+        for _ in range(40):
+            left = (np.abs(error).max(axis=-1, initial=0) > 1e-10) & (part[open_] > 1e-3)
             open_, error = open_[left], error[left]
             if not len(open_):
                 break
-            stepped = p[open_] + _solve(_slopes(lens, p[open_], reach), error)
-            p[open_] = _within(stepped, reach)
-        theta = 2 * np.arctan(np.hypot(p[:, 0], p[:, 1]))
-        closed = np.abs(point - _point_at(lens, p, reach)).max(axis=-1, initial=0) < 1e-6
-    theta[~closed | (theta > theta_max + 1e-12)] = np.nan
-    return theta.reshape(shape), np.arctan2(p[:, 1], p[:, 0]).reshape(shape)
+            step = _solve(_slopes(lens, p[open_], reach), error)
+            tried = _within(p[open_] + part[open_, None] * step, reach)
+            missed = point[open_] - _point_at(lens, tried, reach)
+            better = np.hypot(missed[:, 0], missed[:, 1]) < np.hypot(error[:, 0], error[:, 1])
+            p[open_] = np.where(better[:, None], tried, p[open_])
+            error = np.where(better[:, None], missed, error)
+            part[open_] = np.where(better, 1.0, part[open_] / 4)
+    return p
+
+
+def _distance(lens: BentLens, point: Floats, p: Floats, reach: float) -> Floats:
+    with np.errstate(all="ignore"):
+        apart = point - _point_at(lens, p, reach)
+    return np.asarray(np.where(np.isfinite(apart).all(-1), np.abs(apart).max(-1), np.inf))
 
 
 def _reach(lens: Lens) -> float:

@@ -126,7 +126,8 @@ class SplinedStereographic:
         """The first control point that has a say at u along one axis, and all their weights."""
         place = np.clip(u / self.spacing + (count - 1) / 2, 0, count - 1)
         nearest = np.floor(place + 0.5) if self.order == 2 else np.floor(place)
-        middle = np.clip(nearest, 1, count - self.order).astype(int)
+        # NaN goes through, by its distance from the middle
+        middle = np.clip(np.nan_to_num(nearest), 1, count - self.order).astype(int)
         x = place - middle
         weights = (
             [(x - 0.5) ** 2 / 2, 0.75 - x * x, (x + 0.5) ** 2 / 2]
