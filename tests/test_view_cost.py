@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from freelook.camera import Camera, make_camera
+from freelook.formats import load_camera
 from freelook.lens import Equidistant, Perspective
 from freelook.rotations import body_from_view
 from freelook.view_cost import ViewCost, view_cost
@@ -112,3 +116,21 @@ def test_samples_say_the_same_as_all_pixels() -> None:
     assert few.source_pixels == pytest.approx(every.source_pixels, rel=5e-3)
     assert few.seen == pytest.approx(every.seen, abs=5e-3)
     assert few.largest_size == every.largest_size
+
+
+def test_the_costs_in_the_docs_are_the_real_ones() -> None:
+    text = (Path(__file__).parent.parent / "docs" / "lenses.md").read_text("utf-8")
+    row = r"^\| `([\w-]+)` \| (\d+) x (\d+) \| ([\d.]+) % \|" + r" ([\d.]+) \|" * 3
+    rows = re.findall(row + r" (\d+) x (\d+) \|$", text, re.M)
+    assert len(rows) >= 5
+    for name, *numbers in rows:
+        width, height, share, per_degree, middle, corners, *largest = map(float, numbers)
+        camera = load_camera(name)
+        found = cost(camera, Viewport((1280, 720), 90))
+        assert camera.size == (width, height)
+        assert 100 * found.source_pixels / found.picture_pixels == pytest.approx(share, abs=0.051)
+        assert found.spots["centre"].per_degree[0] == pytest.approx(per_degree, abs=0.051)
+        assert found.spots["centre"].per_view_pixel[0] == pytest.approx(middle, abs=0.0051)
+        assert found.spots["corners"].per_view_pixel[0] == pytest.approx(corners, abs=0.0051)
+        assert list(found.largest_size) == pytest.approx(largest, abs=1)  # rounded down
+        assert found.seen == 1
