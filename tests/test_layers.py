@@ -19,7 +19,7 @@ LAYERS: list[set[str]] = [
     | {"resolution", "view_cost", "comparison"},
     {"sources", "trackers", "sinks", "formats"},
     {"ingest", "head", "session", "offline"},
-    {"cli", "web", "bench", "doctor", "egl"},
+    {"cli", "web", "bench", "paper", "doctor", "egl"},
 ]
 LAYER_OF = {name: number for number, names in enumerate(LAYERS) for name in names}
 PLUG_INS = LAYERS[3]
