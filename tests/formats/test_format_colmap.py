@@ -98,6 +98,15 @@ def test_fisheye_models_go_on_beyond_90_degrees() -> None:
     np.testing.assert_allclose(pixel, [319.5 + 150 * 1.9, 239.5], atol=1e-9)
 
 
+def test_a_field_that_ends_inside_the_picture_is_told() -> None:
+    """r = f t (1 - 0.6 t^2) grows to t = 1 / sqrt(1.8), which is 36.7 degrees."""
+    profile = read(f"1 SIMPLE_RADIAL {SIZE} 480 320 240 -0.6")
+    (note,) = profile.notes
+    assert "ends at 36.7 degrees from the axis, inside the picture" in note
+    assert np.degrees(profile.camera.theta_max) == pytest.approx(36.70, abs=0.01)
+    assert read(line("SIMPLE_RADIAL")).notes == ()
+
+
 @pytest.mark.parametrize("model", LINES)
 def test_a_written_camera_is_the_same_model_and_the_same_camera(model: str) -> None:
     profile = read(line(model))

@@ -231,6 +231,9 @@ WRITTEN_BY_MRCAL = """# made on a day
 """  # noqa: E501
 
 
+CORNERS = ([40, 30], [600, 25], [610, 450], [35, 455])
+
+
 def rays(widest_deg: float) -> Floats:
     """Twelve rays, (12, 3): three angles from the axis in four directions."""
     theta = np.radians(np.linspace(0, widest_deg, 4)[1:])[:, None]
@@ -269,11 +272,12 @@ def test_what_mrcal_wrote_is_read() -> None:
     assert camera.center == (318.75, 241.5)
     np.testing.assert_allclose(camera.stretch, np.diag([1, 258.5 / 261.25]))
     region, pose = profile.notes
-    angles = [reach_deg(camera, pixel) for pixel in ([40, 30], [600, 25], [610, 450], [35, 455])]
-    nearest = reach_deg(camera, [610 - 10 * 208.5 / 425, 241.5])  # the middle of the right edge
-    assert nearest < min(angles)
-    assert region.startswith("reliable to ")
-    assert f"{max(angles):.1f} at best" in region
+    farthest = max(reach_deg(camera, pixel) for pixel in CORNERS)
+    nearest = min(reach_deg(camera, [x, 450 + 5 * (610 - x) / 575]) for x in range(35, 611))
+    assert region == (
+        f"reliable to {nearest:.1f} degrees from the axis all around, and to {farthest:.1f} at "
+        "best (valid_intrinsics_region); the rest is extrapolated"
+    )
     assert "turned by 13.1 degrees and moved by 1.52 in its rig" in pose
 
 

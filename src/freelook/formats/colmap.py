@@ -1,4 +1,4 @@
-"""COLMAP's `cameras.txt`: all its models that have an axis; FILE#ID picks one of several cameras.
+"""COLMAP's cameras.txt: all its models that have an axis; FILE#ID for one of several cameras.
 
 A line is CAMERA_ID MODEL WIDTH HEIGHT PARAMS. COLMAP counts pixels from the corner of the
 picture, so its (0.5, 0.5) is our (0, 0). Models, the order of their parameters, and the formulas:
@@ -16,6 +16,7 @@ from ..errors import ProfileError
 from ..lens import MODELS as LENS_MODELS
 from ..lens import Lens, model_name, parameters
 from ._document import Document
+from ._field import field_notes
 from ._matrix import Matrix, matrix_of
 from ._numbers import picture_size
 from ._profile import Choice, Profile
@@ -80,7 +81,8 @@ def read(document: Document, choice: Choice) -> Profile:
     if len(set(ids)) < len(ids):
         raise ProfileError(f"a CAMERA_ID is given twice: {', '.join(ids[:20])}")
     row = rows[choice.of(ids)]
-    return Profile(_camera(row, f"camera {row[0]}"), name=f"COLMAP camera {row[0]}")
+    camera = _camera(row, f"camera {row[0]}")
+    return Profile(camera, name=f"COLMAP camera {row[0]}", notes=field_notes(camera))
 
 
 def write(profile: Profile) -> str:

@@ -1,4 +1,4 @@
-"""OCamCalib's `calib_results.txt` (Scaramuzza's toolbox): direct and inverse polynomial, centre, affine part.
+"""OCamCalib's calib_results.txt: direct and inverse polynomial, centre, affine part, size.
 
 Comment lines begin with `#`; the numbers between them are, in this order,
 
@@ -15,7 +15,7 @@ atan(z / |xy|), rho = b0 + b1 t + ..., and with (x, y) = rho (x, y) / |xy|
 
 Source: `ocam_functions.c` of the toolbox (cam2world, world2cam, get_ocam_model). The direct
 polynomial is what was calibrated, and what is used here.
-"""  # noqa: E501
+"""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ import numpy as np
 from ..camera import make_camera
 from ..errors import ProfileError
 from ._document import Document
+from ._field import field_notes
 from ._numbers import picture_size
 from ._ocam import MOST_TERMS, check_inverse, expect_ocam, fit_inverse, lens_of, scaled
 from ._profile import Choice, Profile
@@ -63,7 +64,7 @@ def read(document: Document, choice: Choice) -> Profile:
         center=(column, row),
         stretch=np.array([[1.0, e], [d, c]]),
     )
-    return Profile(camera, notes=check_inverse(camera, inverse, SHIFT))
+    return Profile(camera, notes=check_inverse(camera, inverse, SHIFT) + field_notes(camera))
 
 
 def write(profile: Profile) -> str:

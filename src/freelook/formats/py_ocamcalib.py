@@ -1,4 +1,4 @@
-"""py-OCamCalib's calibration as JSON: taylor_coefficient, distortion_center, stretch_matrix, inverse_poly.
+"""py-OCamCalib's JSON: taylor_coefficient, distortion_center, stretch_matrix, inverse_poly.
 
 Scaramuzza's lens as in OCamCalib's text file, with every convention the other way round:
 
@@ -11,7 +11,7 @@ Source: `modelling/camera.py` of jakarto3d/py-OCamCalib (cam2world, load_paramet
 `world2cam` computes y from the already stretched x; the matrix is taken as it stands, as its
 `cam2world` does, and a note says where that makes a difference. The picture's size is not in its
 files; `write` adds image_width and image_height, which its own program does not look at.
-"""  # noqa: E501
+"""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ import numpy as np
 from ..camera import Camera, make_camera
 from ..errors import ProfileError
 from ._document import Document, expect_mapping
+from ._field import field_notes
 from ._numbers import number, numbers, picture_size
 from ._ocam import (
     MOST_DIRECT_TERMS,
@@ -126,4 +127,4 @@ def _notes(data: dict[str, Any], camera: Camera) -> tuple[str, ...]:
             "stretches y by the x it has stretched before; stretch_matrix is used as it stands, "
             "as in its cam2world",
         )
-    return notes
+    return notes + field_notes(camera)
