@@ -68,7 +68,7 @@ def test_everything_of_a_role_has_its_row(role: str, page: str) -> None:
 
 def test_lens_formats_have_their_rows() -> None:
     for name in formats.FORMATS:
-        row = (import_module(f"freelook.formats.{name}").__doc__ or "").strip().splitlines()[0]
+        row = (formats.format_module(name).__doc__ or "").strip().splitlines()[0]
         assert f"| `{name}` | {row} |" in text_of("lenses.md")
 
 
