@@ -70,6 +70,7 @@ def test_another_lens(make: Make, capsys: pytest.CaptureFixture[str]) -> None:
     facts = compared(capsys, a, b)
     rows = facts["by_angle"]
     assert [row["angle_deg"] for row in rows] == [0, 45, 85]
+    assert [row["where"] for row in rows] == ["centre", "45", "rim"]
     assert rows[1]["as_is"]["rms_px"] == pytest.approx(2.8 * 0.785398, rel=1e-4)
     assert rows[1]["as_is"]["rms_deg"] == pytest.approx(45 / 101, rel=1e-4)
     assert rows[0]["as_is"]["rms_px"] < 1e-9
@@ -96,6 +97,20 @@ def test_other_shapes_are_refused(make: Make, capsys: pytest.CaptureFixture[str]
     err = capsys.readouterr().err
     assert "960 x 720 and 960 x 540" in err
     assert "same shape" in err
+
+
+def test_a_picture_that_ends_before_the_lens(
+    make: Make, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its sides are 480 / 400 rad from the axis: told there, and not on a rim nobody sees."""
+    wide = make("wide", parameters={"f": 400.0}, field_deg=200)
+    rows = compared(capsys, wide, wide)["by_angle"]
+    assert [row["where"] for row in rows] == ["centre", "45", "edge", "90"]
+    assert rows[2]["angle_deg"] == pytest.approx(0.999 * 480 / 400 * 57.29578, rel=1e-5)
+    assert rows[2]["as_is"]["max_px"] < 1e-6
+    assert rows[3]["as_is"] is None  # its corners see 86
+    assert compare(wide, wide) == 0
+    assert "68.69, edge of the picture" in capsys.readouterr().out
 
 
 def test_plot(make: Make, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

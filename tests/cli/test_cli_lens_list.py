@@ -104,6 +104,25 @@ def test_a_folder_in_words(folder: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert "reading profiles" in captured.err
 
 
+def test_each_of_several_cameras_in_a_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    camera = """{name}:
+  camera_model: pinhole
+  intrinsics: [{f}, {f}, 255.0, 257.0]
+  distortion_model: equidistant
+  distortion_coeffs: [0.003, 0.0, 0.0, 0.0]
+  resolution: [512, 512]
+"""
+    chain = camera.format(name="cam0", f=190.0) + camera.format(name="cam1", f=-190.0)
+    (tmp_path / "chain.yaml").write_text(chain, "utf-8")
+    first, second = listed(capsys, tmp_path)["profiles"]
+    assert (first["profile"], first["format"]) == ("chain.yaml#cam0", "kalibr")
+    assert first["model"] == "kannala_brandt"
+    assert second["profile"] == "chain.yaml#cam1"
+    assert "positive" in second["refused"]
+
+
 def test_nothing_to_list(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert lens_list(tmp_path) == 2
     assert "no lens profile in" in capsys.readouterr().err

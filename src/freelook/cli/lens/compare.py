@@ -26,7 +26,11 @@ if TYPE_CHECKING:
     from ...camera import Camera
     from ...comparison import Comparison, Numbers
 
-ANGLES_DEG = (0.0, 45.0, 90.0)
+WORDS = {
+    "centre": ", centre",
+    "rim": ", rim of the narrower",
+    "edge": ", edge of the picture",
+}
 NUMBERS = ("rms_px", "max_px", "rms_deg", "max_deg")
 
 
@@ -89,9 +93,7 @@ def _facts(args: argparse.Namespace, a: Camera, b: Camera, found: Comparison) ->
     # both describe one picture: where in A's terms that lies which B calls forward
     angles = head_angles_deg(FRD_FROM_RDF * found.a_from_b)
     pair = {"a": a, "b": b}
-    common = min(a.theta_max, b.theta_max)
-    thetas = [t for t in map(float, np.radians(ANGLES_DEG)) if t < common] + [common]
-    rings = [ring(a, b, found.a_from_b, theta) for theta in thetas]
+    rings = [(where, ring(a, b, found.a_from_b, theta)) for where, theta in _places(a, b)]
     return rounded(
         {
             "a": args.a,
@@ -111,14 +113,31 @@ def _facts(args: argparse.Namespace, a: Camera, b: Camera, found: Comparison) ->
             },
             "by_angle": [
                 {
+                    "where": where,
                     "angle_deg": float(np.degrees(each.theta)),
                     "as_is": _numbers(each.as_is),
                     "turned": _numbers(each.turned),
                 }
-                for each in rings
+                for where, each in rings
             ],
         }
     )
+
+
+def _places(a: Camera, b: Camera) -> list[tuple[str, float]]:
+    """(what it is, angle in radians): the centre, 45 and 90 degrees, and where it ends.
+
+    That is the rim of the narrower lens, or the farthest edge of A's picture if that comes first.
+    """
+    from ...resolution import fields_of_view
+
+    rim = min(a.theta_max, b.theta_max)
+    fields = fields_of_view(a)
+    # a little inside: the edge itself is a matter of rounding
+    edge = 0.999 * np.radians(max(fields.left, fields.right, fields.top, fields.bottom))
+    last = ("rim", rim) if rim <= edge / 0.999 else ("edge", float(edge))
+    places = [("centre", 0.0), ("45", np.radians(45)), ("90", np.radians(90))]
+    return sorted([each for each in places if each[1] < rim] + [last], key=lambda each: each[1])
 
 
 def _numbers(numbers: Numbers | None) -> dict[str, float] | None:
@@ -146,10 +165,9 @@ def _table(facts: dict[str, Any], which: str, title: str) -> Table:
     for column in ("rms px", "max px", "rms degrees", "max degrees"):
         table.add_column(column, justify="right")
     table.add_row("all that both see", *_cells(facts[which]), end_section=True)
-    *rows, rim = facts["by_angle"]
-    for row in rows:
-        table.add_row(f"{row['angle_deg']:g}", *_cells(row[which]))
-    table.add_row(f"{rim['angle_deg']:.4g}, rim of the narrower", *_cells(rim[which]))
+    for row in facts["by_angle"]:
+        name = f"{row['angle_deg']:.4g}{WORDS.get(row['where'], '')}"
+        table.add_row(name, *_cells(row[which]))
     return table
 
 
