@@ -120,14 +120,35 @@ def parse_xml(text: str) -> ElementTree.Element:
     A document type is refused: entities, which grow without end or fetch files, live only there.
     """
     _check_length(text, "XML")
-    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+    if re.search(r"<!(DOCTYPE|ENTITY)", text, re.IGNORECASE):
         raise ProfileError("XML with a document type (<!DOCTYPE ...>) is not read; remove it")
+    parser = ElementTree.XMLParser(target=_ShallowTree())
     try:
-        return ElementTree.fromstring(text.lstrip("\ufeff \t\r\n"))
+        parser.feed(text.lstrip("\ufeff \t\r\n"))
+        root: ElementTree.Element = parser.close()
+        return root
     except ElementTree.ParseError as error:
         raise ProfileError(f"not XML: {error}") from None
     except (ValueError, LookupError) as error:  # half a surrogate pair, an unknown encoding
         raise ProfileError(f"not XML: {error}") from None
+
+
+class _ShallowTree(ElementTree.TreeBuilder):
+    """The usual tree, not deeper than any profile: safe to walk, and quickly refused."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._depth = 0
+
+    def start(self, tag: str, attrs: dict[str, str], /) -> ElementTree.Element:
+        self._depth += 1
+        if self._depth > DEEPEST:
+            raise ProfileError("nested too deeply to be a lens profile")
+        return super().start(tag, attrs)
+
+    def end(self, tag: str, /) -> ElementTree.Element:
+        self._depth -= 1
+        return super().end(tag)
 
 
 def _check_length(text: str, what: str) -> None:
@@ -161,8 +182,13 @@ def _no_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return dict(pairs)
 
 
-def expect_mapping(value: Any, where: str) -> dict[str, Any]:
-    """The value if it is a JSON object or YAML mapping, or ProfileError."""
+def expect_mapping(value: Any, where: str, why_none: str = "") -> dict[str, Any]:
+    """The value if it is a JSON object or YAML mapping, or ProfileError.
+
+    `why_none` is a document's reason for having no value at all.
+    """
+    if value is None and why_none:
+        raise ProfileError(f"{where} cannot be read: {why_none}")
     if not isinstance(value, dict):
         raise ProfileError(f"{where} must be an object, not {value!r:.80}")
     return value

@@ -100,7 +100,7 @@ def read(document: Document, choice: Choice) -> Profile:
     Formulas: Usenko, Demmel and Cremers, "The Double Sphere Camera Model", 3DV 2018, and
     basalt-headers (`basalt/camera`). Where the cameras sit is told and not used.
     """
-    data = expect_mapping(document.json, "a Basalt calibration")
+    data = expect_mapping(document.json, "a Basalt calibration", document.why_not_json)
     value = expect_mapping(data.get("value0"), "value0")
     cameras, sizes = (_list(value, key) for key in ("intrinsics", "resolution"))
     if len(sizes) != len(cameras):

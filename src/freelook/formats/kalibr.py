@@ -80,7 +80,7 @@ def recognises(document: Document) -> bool:
 def read(document: Document, choice: Choice) -> Profile:
     """One camera of the chain. `equidistant` is OpenCV's fisheye model, here also beyond 90
     degrees from the axis; where the cameras sit is told and not used."""
-    data = expect_mapping(document.yaml, "a Kalibr camchain")
+    data = expect_mapping(document.yaml, "a Kalibr camchain", document.why_not_yaml)
     names = _cameras(data)
     if not names:
         raise ProfileError("no camera in it: a Kalibr camchain has cam0, cam1 ...")

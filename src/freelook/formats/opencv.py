@@ -64,6 +64,8 @@ def read(document: Document, choice: Choice) -> Profile:
     where OpenCV's own fisheye functions end, are ordinary rays here.
     """
     data = storage(document)
+    if not data:
+        raise ProfileError(f"not OpenCV's FileStorage{_why_not(document)}")
     if document.looks_like_json and _is_small(data):
         return _read_small(data)
     name, k = needed(data, MATRIX, "a camera matrix")
@@ -98,6 +100,14 @@ def write(profile: Profile) -> str:
         f"{_matrix_text('camera_matrix', 3, rows_of(matrix))}"
         f"{_matrix_text('distortion_coefficients', len(terms), terms)}{last}\n"
     )
+
+
+def _why_not(document: Document) -> str:
+    reasons = (
+        document.why_not_json if document.looks_like_json else document.why_not_yaml,
+        document.why_not_xml if document.looks_like_xml else "",
+    )
+    return "".join(f": {reason}" for reason in reasons if reason)
 
 
 def _kind(data: dict[str, Any], count: int, choice: Choice) -> str:

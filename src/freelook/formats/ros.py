@@ -52,7 +52,12 @@ def read(document: Document, choice: Choice) -> Profile:
     `equidistant` is OpenCV's fisheye model, here also beyond 90 degrees from the axis; the others
     are OpenCV's ordinary model, where a skew in K is ignored.
     """
-    data = expect_mapping(document.yaml, "ROS camera_info")
+    data = expect_mapping(document.yaml, "ROS camera_info", document.why_not_yaml)
+    if not recognises(document):
+        raise ProfileError(
+            "not ROS camera_info: that has camera_matrix with rows, cols and data, or K and "
+            f"distortion_model; the keys here are: {', '.join(list(data)[:20])}"
+        )
     names = _MESSAGE if _is_message(data) else _FILE
     info = {name: _found(data, keys) for name, keys in names.items()}
     width, height, k, d = (_needed(info, name, names) for name in ("width", "height", "K", "D"))
@@ -141,7 +146,7 @@ def _model(said: Any) -> tuple[str, list[str]]:
     """The distortion model, and what is to be told about it."""
     if said in (None, ""):
         return "plumb_bob", ["no distortion_model is given: plumb_bob is assumed, as ROS does"]
-    if said not in COUNTS:
+    if not isinstance(said, str) or said not in COUNTS:
         raise ProfileError(
             f"distortion_model {said!r:.80} is not known; known: {', '.join(COUNTS)}"
         )
