@@ -126,7 +126,9 @@ def test_written_and_read_again_it_is_the_same_camera() -> None:
     camera = read(description()).camera
     text = write(Profile(camera, 'Dome <"&">'))
     assert format_of(Document(text)) == "onvif"
-    again = read(text, size=None).camera
+    profile = read(text, size=None)
+    assert profile.name == 'Dome <"&">'
+    again = profile.camera
     assert again.size == camera.size
     rays = np.random.default_rng(1).normal(size=(2000, 3))
     np.testing.assert_allclose(again.project(rays), camera.project(rays), atol=1e-9)

@@ -48,7 +48,7 @@ RTP = "rtp://127.0.0.1:0"
 @pytest.mark.parametrize(
     ("arguments", "why"),
     [
-        (["fly", RTP], "give --lens PROFILE, a file or one of: demo"),
+        (["fly", RTP], "give --lens PROFILE, a file or one of: "),
         (["fly", RTP, "--lens", "none"], "lens profile none: "),
         (["fly", "no-such-file.mp4", "--lens", "demo"], "no-such-file.mp4"),
         (["fly", __file__, "--lens", "demo"], "test_cli_fly.py"),

@@ -34,6 +34,7 @@ SUFFIX = ".xml"
 MODELS = ("radial_spline",)
 NAMESPACE = "http://www.onvif.org/ver10/schema"
 LARGEST_XML = 2**20  # a device's whole answer has some kB
+NOT_XML = re.compile("[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 DEEPEST = 40
 MOST_POINTS = 4096
 WIDEST_DEG = float(np.degrees(WIDEST_RAD)) - 1e-9
@@ -74,7 +75,9 @@ def read(document: Document, choice: Choice) -> Profile:
         notes.append("ONVIF leaves the sign of Offset open; the axis is taken to be at -Offset")
     if dimmest < 1:
         notes.append(f"transmittance falls to {dimmest:g}; views are not brightened for it")
-    return Profile(camera, source="ONVIF lens description", notes=tuple(notes))
+    named = [element.text or "" for element in root.iter() if _tag(element) == "Name"]
+    name = named[0].strip() if len(named) == 1 else ""
+    return Profile(camera, name, "ONVIF lens description", tuple(notes))
 
 
 def write(profile: Profile) -> str:
@@ -103,7 +106,7 @@ def write(profile: Profile) -> str:
     return (
         '<?xml version="1.0" encoding="UTF-8"?>\n'
         f'<tt:VideoSourceConfiguration xmlns:tt="{NAMESPACE}" token="lens">\n'
-        f"<tt:Name>{escape(profile.name)}</tt:Name>\n"
+        f"<tt:Name>{escape(NOT_XML.sub('', profile.name))}</tt:Name>\n"
         "<tt:UseCount>0</tt:UseCount>\n"
         "<tt:SourceToken>lens</tt:SourceToken>\n"
         f'<tt:Bounds x="0" y="0" width="{width}" height="{height}"/>\n'
@@ -129,7 +132,7 @@ def _parse(text: str) -> ElementTree.Element:
     try:
         parser.feed(text.lstrip("\ufeff \t\r\n"))
         root: ElementTree.Element = parser.close()
-    except ElementTree.ParseError as error:
+    except (ElementTree.ParseError, UnicodeEncodeError) as error:
         raise ProfileError(f"not XML: {error}") from None
     return root
 

@@ -21,6 +21,7 @@ from ..errors import ProfileError
 from ..lens import Polynomial, model_name
 from ..rotations import RDF_FROM_FRD
 from ._document import Document, expect_mapping
+from ._field import field_notes
 from ._matrix import Matrix, matrix_of
 from ._numbers import check_keys, number, numbers, picture_size
 from ._profile import Choice, Profile
@@ -69,7 +70,8 @@ def read(document: Document, choice: Choice) -> Profile:
         camera_from_body=mount,
     )
     name = data.get("name", "")
-    return Profile(camera, name if isinstance(name, str) else "", "WoodScape calibration", notes)
+    name = name if isinstance(name, str) else ""
+    return Profile(camera, name, "WoodScape calibration", notes + field_notes(camera))
 
 
 def write(profile: Profile) -> str:
