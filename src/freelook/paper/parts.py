@@ -39,7 +39,8 @@ def section(settings: Settings) -> Section:
             f"The window is {100 * window_share():.2f} % of the picture, one pixel in sixteen. TV "
             f"lines are counted over a width equal to the height, so {printed.TV_LINES} of them "
             f"are {resolved:.0f} over the whole width: the camera resolves "
-            f"{100 * resolved / width:.0f} % of the {width} columns, and some {resolved / 4:.0f} of the window's 180.",
+            f"{100 * resolved / width:.0f} % of the {width} columns, and "
+            f"some {resolved / 4:.0f} of the window's 180.",
             "“The operator does not notice a delay” was not measured. What freelook adds can be: "
             "see freelook bench latency.",
         ),
