@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from io import StringIO
 
 from ..errors import ProfileError
 from ._numbers import number
@@ -22,7 +23,9 @@ def word_numbers(words: Sequence[str], where: str) -> list[float]:
     return [word_number(word, f"{where}[{i}]") for i, word in enumerate(words)]
 
 
-def without_comments(text: str) -> list[str]:
+def without_comments(text: str) -> Iterator[str]:
     """The lines that say something: not empty, and not begun with `#`."""
-    lines = (line.strip() for line in text.removeprefix("\ufeff").splitlines())
-    return [line for line in lines if line and not line.startswith("#")]
+    for line in StringIO(text.removeprefix("\ufeff")):
+        stripped = line.strip()
+        if stripped and not stripped.startswith("#"):
+            yield stripped

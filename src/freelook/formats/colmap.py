@@ -64,12 +64,12 @@ COLMAP_MODELS = {
     "EUCM": _Model("eucm", 2, ("alpha", "beta")),
 }
 MODELS = tuple(dict.fromkeys(model.lens for model in COLMAP_MODELS.values()))
+MANY = 100  # with a camera for every picture there are thousands: too many to list
 LINE = re.compile(r"\d+\s+[A-Z][A-Z0-9_]+\s+\d+\s+\d+\s+[-+.\d]")
 
 
 def recognises(document: Document) -> bool:
-    lines = without_comments(document.text)
-    return bool(lines and LINE.match(lines[0]))
+    return bool(LINE.match(next(without_comments(document.text), "")))
 
 
 def read(document: Document, choice: Choice) -> Profile:
@@ -80,6 +80,8 @@ def read(document: Document, choice: Choice) -> Profile:
     ids = [row[0] for row in rows]
     if len(set(ids)) < len(ids):
         raise ProfileError(f"a CAMERA_ID is given twice: {', '.join(ids[:20])}")
+    if len(ids) > MANY and choice.pick not in ids:
+        raise ProfileError(f"{len(ids)} cameras in it: add a CAMERA_ID, as in FILE#{ids[0]:.20}")
     row = rows[choice.of(ids)]
     camera = _camera(row, f"camera {row[0]}")
     return Profile(camera, name=f"COLMAP camera {row[0]}", notes=field_notes(camera))

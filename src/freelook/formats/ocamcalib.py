@@ -19,6 +19,8 @@ polynomial is what was calibrated, and what is used here.
 
 from __future__ import annotations
 
+from itertools import islice
+
 import numpy as np
 
 from ..camera import make_camera
@@ -38,7 +40,7 @@ MOST_WORDS = 2 * MOST_TERMS + 9
 
 def recognises(document: Document) -> bool:
     """Whether it begins with two lines of numbers that say how many they are."""
-    lines = [line.split() for line in without_comments(document.text)[:2]]
+    lines = [line.split() for line in islice(without_comments(document.text), 2)]
     return len(lines) == 2 and all(
         words[0] == str(len(words) - 1) and all(map(NUMBER.fullmatch, words)) for words in lines
     )
