@@ -247,7 +247,7 @@ def _angles_of(lens: BentLens, point: Floats, theta_max: float) -> tuple[Floats,
     theta = np.where(np.isnan(theta), theta_max, theta)
     phi = np.arctan2(point[:, 1], point[:, 0])
     p = np.tan(theta / 2)[:, None] * np.stack([np.cos(phi), np.sin(phi)], axis=-1)
-    reach = min(1.05 * np.tan(theta_max / 2), _reach(lens))
+    reach = min(1.001 * np.tan(theta_max / 2), _reach(lens))
     p = _newton(lens, point, p, reach)
     lost = _distance(lens, point, p, reach) > 1e-6
     if lost.any():

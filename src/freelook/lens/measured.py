@@ -113,7 +113,7 @@ def _slope(q: Floats, taylor: Sequence[float]) -> Floats:
 
 @dataclass(frozen=True)
 class RadialSpline:
-    """a cubic spline through the points (angles_deg, radii_px): what was measured, joined up.
+    """A cubic spline through the points (angles_deg, radii_px): what was measured, joined up.
 
     Twice continuously differentiable, 0 on the axis and odd there, so smooth across it; at the
     last point the last two pieces are one cubic. It ends at the last angle: nothing is known

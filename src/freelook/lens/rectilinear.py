@@ -91,17 +91,18 @@ class FieldOfView:
 
 @dataclass(frozen=True)
 class OpenCVRational:
-    """r = f t (1 + k1 t^2 + k2 t^4 + k3 t^6) / (1 + k4 t^2 + k5 t^4 + k6 t^6), t = tan(theta), below 90 degrees: and decentred.
+    """r = f t (1 + k1 t^2 + k2 t^4 + k3 t^6) / (1 + k4 t^2 + k5 t^4 + k6 t^6), t = tan(theta).
 
-    With (x, y) = t (cos phi, sin phi) these are added, in units of f,
+    And decentred: with (x, y) = t (cos phi, sin phi) these are added, in units of f,
 
         2 p1 x y + p2 (t^2 + 2 x^2) + s1 t^2 + s2 t^4
         2 p2 x y + p1 (t^2 + 2 y^2) + s3 t^2 + s4 t^4
 
     and then the sensor is tilted about x by tau_x and about y by tau_y, radians. OpenCV's ordinary
     model ("Camera Calibration and 3D Reconstruction"), parameters in its order; with k4 and all
-    behind it 0 it is the plumb-bob model. It ends where the denominator first becomes 0.
-    """  # noqa: E501
+    behind it 0 it is the plumb-bob model. It ends where the denominator first becomes 0, at
+    90 degrees at the latest.
+    """
 
     f: float
     k1: float = 0.0

@@ -17,11 +17,11 @@ from .base import Floats
 
 @dataclass(frozen=True)
 class DoubleSphere:
-    """r = f sin(theta) / (alpha d + (1 - alpha) (xi + cos(theta))), d^2 = sin(theta)^2 + (xi + cos(theta))^2: two spheres.
+    """r = f s / (alpha hypot(s, z) + (1 - alpha) z), s = sin(theta), z = xi + cos(theta).
 
     Usenko, Demmel and Cremers, "The Double Sphere Camera Model", 3DV 2018, equations 40 to 46;
     Kalibr's `ds`, Basalt's `ds`. xi is in (-1, 1], alpha in [0, 1].
-    """  # noqa: E501
+    """
 
     f: float
     xi: float = -0.2
@@ -44,12 +44,12 @@ class DoubleSphere:
 
 @dataclass(frozen=True)
 class ExtendedUnified:
-    """r = f sin(theta) / (alpha d + (1 - alpha) cos(theta)), d^2 = beta sin(theta)^2 + cos(theta)^2: a sphere or another quadric.
+    """r = f s / (alpha sqrt(beta s^2 + c^2) + (1 - alpha) c), s = sin(theta), c = cos(theta).
 
     Khomutenko, Garcia and Martinet, "An Enhanced Unified Camera Model", IEEE RA-L 2016; domain as
     in Usenko et al. 2018, equations 28 to 31. Kalibr's `eucm`, COLMAP's EUCM (which itself ends at
-    90 degrees). alpha is in [0, 1], beta above 0; beta = 1 is the unified model (Kalibr's `ucm`).
-    """  # noqa: E501
+    90 degrees). alpha is in [0, 1], beta above 0; beta = 1 is the unified model (Basalt's `ucm`).
+    """
 
     f: float
     alpha: float = 0.5
@@ -57,7 +57,7 @@ class ExtendedUnified:
 
     @cached_property
     def hard_limit(self) -> float:
-        """Where cos(theta) = -w d."""
+        """Where cos(theta) = -w sqrt(beta s^2 + c^2)."""
         if not self.beta > 0:
             return 0.0
         w = _share(self.alpha)
@@ -78,7 +78,7 @@ def _share(alpha: float) -> float:
 
 @dataclass(frozen=True)
 class Mei:
-    """r = f (m + k1 m^3 + k2 m^5 + k3 m^7), m = sin(theta) / (xi + cos(theta)): a sphere, and decentred.
+    """r = f (m + k1 m^3 + k2 m^5 + k3 m^7), m = sin(theta) / (xi + cos(theta)): and decentred.
 
     With (x, y) = m (cos phi, sin phi) the offset is, in units of f,
 
@@ -88,7 +88,7 @@ class Mei:
     Mei and Rives, "Single View Point Omnidirectional Camera Calibration from Planar Grids", ICRA
     2007; the sphere is Barreto's and Geyer's. OpenCV's `omnidir` and Kalibr's `omni-radtan` (both
     without k3), Gyroflow's `insta360`. xi is above -1.
-    """  # noqa: E501
+    """
 
     f: float
     xi: float = 1.0
