@@ -187,9 +187,7 @@ def test_thousands_of_cameras_are_not_listed() -> None:
     text = "".join(line("FISHEYE", number) for number in range(5, 3005))
     assert read(text, "1234").name == "COLMAP camera 1234"
     for pick in (None, "3"):
-        with pytest.raises(
-            ProfileError, match="3000 cameras in it: add a CAMERA_ID, as in FILE#5$"
-        ):
+        with pytest.raises(ProfileError, match=r"3000 cameras in it: add .*, as in FILE#5$"):
             read(text, pick)
 
 

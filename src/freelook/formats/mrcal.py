@@ -130,10 +130,12 @@ def _dictionary(text: str) -> dict[str, Any]:
         raise ProfileError(
             f"not a Python dictionary of plain values: {str(error)[:80] or 'nested too deeply'}"
         ) from None
-    for key in keys:
-        if not isinstance(key, str) or keys.count(key) > 1:
+    data: dict[str, Any] = {}
+    for key, value in zip(keys, values, strict=True):
+        if not isinstance(key, str) or key in data:
             raise ProfileError(f"key {key!r:.40} is no name, or is given twice")
-    return {str(key): value for key, value in zip(keys, values, strict=True)}
+        data[key] = value
+    return data
 
 
 def _no_giants(body: ast.Dict) -> None:
