@@ -78,8 +78,8 @@ def solve(
 ) -> Solution:
     """Adjust everything, starting from a camera and poses that are about right.
 
-    `robust=False` counts every point fully. `steps` bounds each minimisation. CalibrationError when the views do not determine the
-    camera.
+    `robust=False` counts every point fully. `steps` bounds each minimisation. CalibrationError when
+    the views do not determine the camera.
     """
     problem = _Problem(views, camera, freedom or Freedom())
     state = _State(problem.parameters.values, tuple(poses))

@@ -36,6 +36,7 @@ AUTO = (
 )
 # A more complex model must predict at least this much better.
 WORTH_IT = 0.99
+OVERFIT = 1.3  # times the RMS on views left out
 FOLDS = 5
 KNOT_EVERY_DEG = 12.0
 MARGIN = np.radians(5.0)  # of field beyond the outermost point seen
@@ -53,6 +54,12 @@ class Candidate:
     cross_validated_px: float = float("nan")
     solution: Solution | None = None
     why_not: str = ""
+
+    @property
+    def remark(self) -> str:
+        """In words, if it predicts much worse than it fits."""
+        overfit = self.cross_validated_px > OVERFIT * self.rms_px
+        return "overfit: fits these views, predicts others worse" if overfit else ""
 
 
 @dataclass(frozen=True)
@@ -75,6 +82,7 @@ class Calibration:
     dropped: tuple[tuple[str, str], ...]
     candidates: tuple[Candidate, ...]
     seen_rad: float
+    freedom: Freedom
 
     @property
     def rms_px(self) -> float:
@@ -123,6 +131,7 @@ def calibrate(
         dropped,
         tuple(candidates),
         seen,
+        freedom,
     )
 
 

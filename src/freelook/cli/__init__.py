@@ -14,7 +14,7 @@ from importlib import import_module
 from .. import __version__
 from ..errors import FreelookError, MissingExtra
 
-COMMANDS = ("demo", "fly", "render", "simulate", "lens", "paper", "bench", "doctor")
+COMMANDS = ("demo", "fly", "render", "simulate", "lens", "calibrate", "paper", "bench", "doctor")
 
 EXTRA_OF = {
     "aiohttp": "web",

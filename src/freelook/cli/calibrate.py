@@ -1,0 +1,152 @@
+"""Calibrate a camera from pictures of a chessboard or another target, beyond 90 degrees too.
+
+  freelook calibrate board --target chessboard --board 9x6 -o board.pdf     print a board
+  freelook calibrate shots/*.jpg -o lens.json                               size found by itself
+  freelook calibrate shots/*.jpg --board 6x8 --square 0.0325 -o lens.json --report report.html
+  freelook calibrate board.mp4 --model auto -o lens.json                    from a video
+  freelook calibrate corners/*.orpc --json                                  from known corners
+
+Hold the board close, so that it fills much of the picture, in 10 to 20 places: the middle, all
+around the rim, straight and tilted. Nothing has to be guessed beforehand.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import CalibrationError, FreelookError
+from ..lens import MODELS
+from ._arguments import size
+
+if TYPE_CHECKING:
+    from ..calibration.calibrate import Calibration
+    from ._target_views import Found
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("inputs", nargs="+", metavar="INPUT", help="pictures, videos, corner files")
+    parser.add_argument(
+        "--board", type=size, metavar="CxR", help="inner corners across x down (default: found)"
+    )
+    parser.add_argument(
+        "--square", type=float, default=1.0, metavar="M", help="side of a square, metres"
+    )
+    parser.add_argument(
+        "--model",
+        default="auto",
+        choices=("auto", *MODELS),
+        metavar="NAME",
+        help="lens model, or auto: the one that predicts unseen views best",
+    )
+    parser.add_argument("--skew", action="store_true", help="solve for skewed pixels too")
+    parser.add_argument("--square-pixels", action="store_true", help="take pixels as square")
+    parser.add_argument("-o", "--output", metavar="FILE", help="write the lens profile here")
+    parser.add_argument("--name", default="", help="for people: which camera and lens it is")
+    parser.add_argument("--report", metavar="HTML", help="write a page with pictures of it all")
+    parser.add_argument("--json", action="store_true", help="print all figures as JSON")
+    parser.add_argument("--overwrite", action="store_true", help="replace files that exist")
+
+
+def run(args: argparse.Namespace) -> int:
+    from ..calibration.calibrate import calibrate
+    from ..calibration.parameters import Freedom
+    from ..calibration.targets import Chessboard
+    from ._calibration_words import figures
+    from ._target_views import find_views
+
+    for path in (args.output, args.report):
+        if path and Path(path).exists() and not args.overwrite:
+            raise FreelookError(f"{path} exists; --overwrite replaces it")
+    found = find_views(args.inputs, Chessboard(args.square, args.board), quiet=args.json)
+    if not found.views:
+        raise CalibrationError(_nothing_found(found))
+    assert found.size is not None
+    freedom = Freedom(aspect=not args.square_pixels, skew=args.skew)
+    say = (
+        (lambda _: None) if args.json else (lambda what: print(f"solving: {what}", file=sys.stderr))
+    )
+    calibration = calibrate(found.views, found.size, args.model, freedom, progress=say)
+    if args.json:
+        print(json.dumps(figures(calibration, found.without), indent=2))
+    else:
+        _print(calibration, found)
+    if args.output:
+        _write(args, calibration)
+    return 0
+
+
+def _nothing_found(found: Found) -> str:
+    shown = ", ".join(found.without[:5]) + (" ..." if len(found.without) > 5 else "")
+    return (
+        f"the target was found in none of {len(found.without)} inputs ({shown}); is it wholly or "
+        "mostly in the picture, sharp, flat, evenly lit, with a light margin?"
+    )
+
+
+def _print(calibration: Calibration, found: Found) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from ..calibration.bundle import rms
+    from ._calibration_words import sentences
+
+    for name in found.without:
+        print(f"{name}: target not found", file=sys.stderr)
+    console = Console()
+    solution = calibration.solution
+    views = Table(title="views")
+    for column in ("picture", "points", "dropped", "RMS px"):
+        views.add_column(column, justify="left" if column == "picture" else "right")
+    rows = zip(calibration.views, solution.residuals, solution.inliers, strict=True)
+    for view, residuals, ok in rows:
+        views.add_row(view.name, str(len(ok)), str(int((~ok).sum())), f"{rms(residuals[ok]):.3f}")
+    console.print(views)
+    if len(calibration.candidates) > 1:
+        console.print(_models(calibration))
+    values = Table(title="result")
+    for column in ("parameter", "value", "standard deviation"):
+        values.add_column(column, justify="left" if column == "parameter" else "right")
+    sigma = np.sqrt(np.diag(solution.covariance))
+    from ..calibration.parameters import Parameters
+
+    found_values = Parameters(solution.camera, calibration.freedom).values
+    for name, value, spread in zip(solution.names, found_values, sigma, strict=True):
+        values.add_row(name, f"{value:.6g}", f"{spread:.2g}")
+    console.print(values)
+    for line in sentences(calibration):
+        print(line)
+
+
+def _models(calibration: Calibration):  # type: ignore[no-untyped-def]
+    from rich.table import Table
+
+    table = Table(title="models")
+    for column in ("model", "RMS px", "on views left out, px", ""):
+        table.add_column(column, justify="left" if column in ("model", "") else "right")
+    for candidate in calibration.candidates:
+        if candidate.solution is None:
+            table.add_row(candidate.model, "", "", candidate.why_not)
+            continue
+        chosen = "chosen" if candidate.model == calibration.model else candidate.remark
+        figures = f"{candidate.rms_px:.3f}", f"{candidate.cross_validated_px:.3f}"
+        table.add_row(candidate.model, *figures, chosen)
+    return table
+
+
+def _write(args: argparse.Namespace, calibration: Calibration) -> None:
+    from ..formats import Profile, format_module
+
+    source = (
+        f"calibrated from {len(calibration.views)} views, {calibration.rms_px:.3f} px RMS, "
+        f"corners to {np.degrees(calibration.seen_rad):.0f} degrees from the axis"
+    )
+    text = format_module("freelook").write(Profile(calibration.camera, args.name, source))
+    Path(args.output).write_text(text, "utf-8")
+    if not args.json:
+        print(f"written: {args.output}")
