@@ -7,6 +7,7 @@ A command module has a one-line docstring (its help), `add_arguments(parser)` an
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -40,7 +41,7 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"freelook {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name in COMMANDS:
-        module = import_module(f".{name}", __name__)
+        module = import_module(f".{name.replace(' ', '_')}", __name__)
         assert module.__doc__
         summary = module.__doc__.strip().splitlines()[0]
         command = commands.add_parser(
@@ -54,9 +55,16 @@ def make_parser() -> argparse.ArgumentParser:
     return parser
 
 
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """The arguments, understood; commands of two words are joined to the one name they have."""
+    two = " ".join(arguments[:2])
+    joined = [two, *arguments[2:]] if two in COMMANDS else arguments
+    return make_parser().parse_args(joined)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; errors made on purpose become one line and exit status 2."""
-    args = make_parser().parse_args(arguments)
+    args = parse(sys.argv[1:] if arguments is None else arguments)
     try:
         return int(args.run(args))
     except ModuleNotFoundError as error:
@@ -67,6 +75,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _fail(args.command, error)
     except KeyboardInterrupt:
         return 130
+    except BrokenPipeError:  # `freelook lens list | head`: nobody reads on
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 141
 
 
 def _fail(command: str, error: FreelookError) -> int:
