@@ -358,3 +358,5 @@ EXAMPLES: dict[str, list[Example]] = {
         )
     ],
 }
+
+ALL = [example for examples in EXAMPLES.values() for example in examples]

@@ -29,11 +29,9 @@ from freelook.lens import (
     image_point,
 )
 from freelook.rotations import RDF_FROM_FRD
-from lens_examples import EXAMPLES
+from lens_examples import ALL, EXAMPLES
 
-CAMERAS: dict[str, Camera] = {
-    str(example): example.camera for examples in EXAMPLES.values() for example in examples
-}
+CAMERAS: dict[str, Camera] = {str(example): example.camera for example in ALL}
 BENT = {name: camera for name, camera in CAMERAS.items() if isinstance(camera.lens, BentLens)}
 ROUND = {name: camera for name, camera in CAMERAS.items() if name not in BENT}
 WIDE = {

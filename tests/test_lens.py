@@ -47,10 +47,7 @@ from freelook.lens import (
     vector,
     with_vector,
 )
-from lens_examples import EXAMPLES, Example
-
-ALL = [example for examples in EXAMPLES.values() for example in examples]
-
+from lens_examples import ALL, EXAMPLES, Example
 
 BENT = [example for example in ALL if isinstance(example.lens, BentLens)]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +18,20 @@ from freelook.camera import make_camera
 from freelook.errors import ProfileError
 from freelook.formats import Document, Profile, builtin_names, load_camera, parse_camera
 from freelook.formats.freelook import write
-from freelook.lens import MODELS, Equidistant, KannalaBrandt, Orthographic, model_name
+from freelook.lens import (
+    MODELS,
+    DoubleSphere,
+    Equidistant,
+    KannalaBrandt,
+    Orthographic,
+    Perspective,
+    RadialSpline,
+    ThinPrismFisheye,
+    model_name,
+    parameters,
+)
 from freelook.rotations import angle_between_deg, body_from_view, head_angles_deg
+from lens_examples import ALL, Example
 
 OWN: dict[str, Any] = {
     "freelook_lens": 1,
@@ -79,29 +92,46 @@ def test_a_mount_is_where_the_camera_looks() -> None:
     np.testing.assert_allclose(pixel, camera.center, atol=1e-9)
 
 
-@pytest.mark.parametrize("model", MODELS)
-def test_written_profiles_are_read_back_the_same(model: str) -> None:
+@pytest.mark.parametrize("example", ALL, ids=str)
+def test_written_profiles_are_read_back_the_same(example: Example) -> None:
     camera = make_camera(
         (1000, 800),
-        MODELS[model](300.0),  # type: ignore[call-arg]
+        example.lens,
         center=(1.5, 2.25),
-        field_deg=150,
+        field_deg=example.field_deg,
         stretch=np.array([[1, 0.1], [0, 0.9]]),
         camera_from_body=body_from_view(10, -20, 30).inv(),
     )
     again = parse_camera(write(Profile(camera)))
     assert (again.size, again.lens, again.center) == (camera.size, camera.lens, camera.center)
-    assert model_name(again.lens) == model
+    assert model_name(again.lens) == model_name(example.lens)
     assert again.theta_max == pytest.approx(camera.theta_max)
     np.testing.assert_array_equal(again.stretch, camera.stretch)
     assert angle_between_deg(again.camera_from_body, camera.camera_from_body) < 1e-9
 
 
-@pytest.mark.parametrize("lens", [KannalaBrandt(300, -0.05), Orthographic(300)], ids=str)
+@pytest.mark.parametrize(
+    "lens",
+    [
+        KannalaBrandt(300, -0.05),
+        Orthographic(300),
+        Perspective(3000),
+        RadialSpline((40.0, 94.0), (200.0, 450.0)),
+        DoubleSphere(300, 0.2, 0.8),
+        ThinPrismFisheye(300, -0.05, p1=0.01),
+    ],
+    ids=lambda lens: type(lens).__name__,
+)
 def test_a_field_that_ends_at_the_limit_survives_the_round_trip(lens: Any) -> None:
-    camera = make_camera((4000, 4000), lens)
+    camera = make_camera((40_000, 40_000), lens)
     again = parse_camera(write(Profile(camera)))
     assert again.theta_max == pytest.approx(camera.theta_max, abs=1e-9)
+
+
+def test_measured_points_are_good_to_the_last_one() -> None:
+    lens = RadialSpline((40.0, 94.0), (200.0, 450.0))
+    assert np.degrees(make_camera((4000, 4000), lens).theta_max) == pytest.approx(94)
+    assert np.degrees(make_camera((1000, 800), lens, field_deg=188).theta_max) == pytest.approx(94)
 
 
 def test_opencv_parameters() -> None:
@@ -138,6 +168,15 @@ FAULTS = [
     (own(parameters={"f": "300"}), r"parameters\.f must be a number, not '300'"),
     (own(parameters={"f": True}), r"parameters\.f must be a number, not True"),
     (own(parameters={"f": None}), r"parameters\.f must be a number, not None"),
+    (own(parameters={"f": [300, 2]}), r"parameters\.f must be a number, not \[300, 2\]"),
+    (
+        own(model="ocamcalib", parameters={"f": 300, "taylor": 0.5}),
+        r"parameters\.taylor must be a list of 1 to 4096 numbers, not 0\.5",
+    ),
+    (
+        own(model="radial_spline", parameters={"angles_deg": [10, 20]}),
+        r"key 'radii_px' is missing in the parameters of model 'radial_spline'",
+    ),
     (own(parameters={"f": 1e300}), r"parameters\.f = 1e\+300 is not a number a lens can have"),
     (own(parameters={"f": 1e-300}), r"parameters\.f = 1e-300 is not a number a lens can have"),
     (own(parameters={"f": -300}), r"does not grow with the angle"),
@@ -202,7 +241,7 @@ def test_every_format_has_its_entry_points_and_its_line_of_documentation() -> No
     from importlib import import_module
 
     for name in formats.FORMATS:
-        module = import_module(f"freelook.formats.{name}")
+        module = import_module(f"freelook.formats.{name.replace('-', '_')}")
         assert module.__doc__
         assert len(module.__doc__.strip().splitlines()[0]) > 20
         assert not module.recognises(Document("{}"))
@@ -213,6 +252,8 @@ json_values = st.recursive(
     lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=5), inner),
     max_leaves=8,
 )
+# of every size, and mostly of a size that lenses have
+numbers = st.floats(allow_nan=False) | st.floats(-3, 3) | st.integers(-5, 400)
 keys = st.sampled_from([*OWN, "center", "field_deg", "stretch", "mount_deg", "K", "D"])
 
 
@@ -228,16 +269,41 @@ def test_any_change_is_read_or_refused(changes: dict[str, Any]) -> None:
 
 @given(
     model=st.sampled_from(sorted(MODELS)),
-    values=st.lists(st.floats(allow_nan=False), min_size=1, max_size=5),
+    values=st.lists(numbers | st.lists(numbers, max_size=5), min_size=1, max_size=15),
     field_deg=st.none() | st.floats(-10, 400),
 )
 def test_any_parameters_make_a_lens_that_works_or_an_error(
-    model: str, values: list[float], field_deg: float | None
+    model: str, values: list[Any], field_deg: float | None
 ) -> None:
-    from dataclasses import fields
-
     names = [f.name for f in fields(MODELS[model])]  # type: ignore[arg-type]
-    changes: dict[str, Any] = {"model": model, "parameters": dict(zip(names, values, strict=False))}
+    makes_a_lens_or_an_error(model, dict(zip(names, values, strict=False)), field_deg)
+
+
+@given(
+    example=st.sampled_from(ALL),
+    changes=st.lists(st.tuples(st.integers(0, 200), numbers), min_size=1, max_size=3),
+    field_deg=st.none() | st.floats(1, 280),
+)
+def test_a_real_calibration_with_wrong_numbers_is_a_lens_or_an_error(
+    example: Example, changes: list[tuple[int, float]], field_deg: float | None
+) -> None:
+    values: dict[str, Any] = {
+        name: list(value) if isinstance(value, tuple) else value
+        for name, value in parameters(example.lens).items()
+    }
+    places = [(values, name) for name, value in values.items() if not isinstance(value, list)]
+    lists = [value for value in values.values() if isinstance(value, list)]
+    slots: list[tuple[Any, Any]] = places + [
+        (items, i) for items in lists for i in range(len(items))
+    ]
+    for place, number in changes:
+        holder, key = slots[place % len(slots)]
+        holder[key] = number
+    makes_a_lens_or_an_error(model_name(example.lens), values, field_deg)
+
+
+def makes_a_lens_or_an_error(model: str, values: dict[str, Any], field_deg: float | None) -> None:
+    changes: dict[str, Any] = {"model": model, "parameters": values}
     if field_deg is not None:
         changes["field_deg"] = field_deg
     try:
@@ -247,6 +313,9 @@ def test_any_parameters_make_a_lens_that_works_or_an_error(
     grid = np.linspace(0, camera.theta_max, 100)
     assert (np.diff(camera.lens.radius(grid)) > 0).all()
     assert np.isfinite(camera.table.g).all()
+    assert camera.grid is None or np.isfinite(camera.grid.offsets).all()
+    middle = camera.ray(np.array([[499.5, 399.5], [700.0, 200.0]]))
+    assert (np.isnan(middle) | (np.abs(middle) <= 1)).all()
 
 
 @given(st.text(max_size=200) | st.text(alphabet='{}[]",:0123456789.eE+-KDfa ', max_size=80))
