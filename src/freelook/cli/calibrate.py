@@ -57,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
     from ..calibration.calibrate import calibrate
     from ..calibration.parameters import Freedom
     from ..calibration.targets import Chessboard
-    from ._calibration_words import figures
+    from ..calibration.words import figures
     from ._target_views import find_views
 
     for path in (args.output, args.report):
@@ -94,7 +94,7 @@ def _print(calibration: Calibration, found: Found) -> None:
     from rich.table import Table
 
     from ..calibration.bundle import rms
-    from ._calibration_words import sentences
+    from ..calibration.words import sentences
 
     for name in found.without:
         print(f"{name}: target not found", file=sys.stderr)

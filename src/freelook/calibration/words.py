@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from ..calibration.bundle import rms
-from ..calibration.calibrate import Calibration
 from ..lens import Floats, model_name, parameters
+from .bundle import rms
+from .calibrate import Calibration
 
 
 def figures(calibration: Calibration, without: list[str]) -> dict[str, Any]:
