@@ -216,7 +216,9 @@ class TestFolder:
         with pytest.raises(SinkError, match=r"not empty.*--overwrite"):
             report.open_folder(tmp_path, overwrite=False)
         assert [p.name for p in tmp_path.iterdir()] == ["mine.txt"]
+        (tmp_path / "index.html").write_text("of an earlier report")
         report.open_folder(tmp_path, overwrite=True)
+        assert not (tmp_path / "index.html").exists()  # until the new one is whole
         assert (tmp_path / "mine.txt").read_text() == "precious"
 
     def test_a_file_is_no_folder(self, tmp_path: Path) -> None:

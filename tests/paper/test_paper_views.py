@@ -48,7 +48,7 @@ def test_rectified_view_has_straight_lines_where_the_crop_has_not() -> None:
     across = np.radians(np.linspace(-25, 25, 51))
     edge = np.stack([np.tan(across), np.full(51, -np.tan(np.radians(18))), np.ones(51)], axis=-1)
     in_crop = rig.camera().project(edge)
-    assert np.ptp(in_crop[:, 1]) > 4  # bent by pixels in the crop
+    assert np.ptp(in_crop[:, 1]) > 3  # bent by pixels in the crop
     in_view = views.RECTIFIED.focal_px * edge[:, 1] / edge[:, 2]
     assert np.ptp(in_view) < 1e-9
     # and the renderer looks there: the view's row under the edge sees the edge's pixels

@@ -48,7 +48,7 @@ def whole(least: int) -> Callable[[str], int]:
 
 def run(args: argparse.Namespace) -> int:
     from ..paper.exhibit import Settings
-    from ..paper.report import SECTIONS, open_folder, write_report
+    from ..paper.report import PAGE, SECTIONS, open_folder, write_report
     from ._bars import bar
 
     settings = Settings(seed=args.seed, draws=args.draws, threads=os.cpu_count() or 1)
@@ -56,5 +56,5 @@ def run(args: argparse.Namespace) -> int:
     with bar("paper", len(SECTIONS), "sections") as advance:
         sections = write_report(args.outdir, settings, advance)
     figures = sum(exhibit.draw is not None for s in sections for exhibit in s.exhibits)
-    print(f"{args.outdir / 'index.html'}: {len(sections)} sections, {figures} figures")
+    print(f"{args.outdir / PAGE}: {len(sections)} sections, {figures} figures")
     return 0

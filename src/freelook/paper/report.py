@@ -12,6 +12,8 @@ from ..plots._style import save
 from .exhibit import Exhibit, Section, Settings
 from .page import FIGURES, NUMBERS, page
 
+PAGE = "index.html"
+
 # In the paper's order; each is a module here with `section(settings)`.
 SECTIONS = (
     "projections",
@@ -38,7 +40,10 @@ def make_section(name: str, settings: Settings) -> Section:
 
 
 def open_folder(out: Path, *, overwrite: bool) -> None:
-    """Make the folder and those it holds; SinkError if it cannot be written to or is not empty."""
+    """Make the folder and those it holds, without an old report's page.
+
+    SinkError if it cannot be written to, or is not empty and `overwrite` is not given.
+    """
     try:
         if out.is_dir() and any(out.iterdir()) and not overwrite:
             raise SinkError(
@@ -47,6 +52,7 @@ def open_folder(out: Path, *, overwrite: bool) -> None:
             )
         for folder in (out, out / FIGURES, out / NUMBERS):
             folder.mkdir(parents=True, exist_ok=True)
+        (out / PAGE).unlink(missing_ok=True)
     except OSError as error:
         raise SinkError(f"cannot write into {out}: {error.strerror or error}") from None
 
@@ -56,8 +62,8 @@ def write_report(
 ) -> list[Section]:
     """Everything into a folder that `open_folder` has made; `advance` after each section.
 
-    index.html comes last: where there is one, the report is whole. SinkError where the system
-    does not let it write.
+    The page comes last: where there is one, the report is whole. SinkError where the system does
+    not let it write.
     """
     sections = []
     for name in SECTIONS:
@@ -66,7 +72,7 @@ def write_report(
             write_exhibit(out, exhibit)
         advance()
     write_text(out / "style.css", (files(__package__) / "style.css").read_text("utf-8"))
-    write_text(out / "index.html", page(sections, settings))
+    write_text(out / PAGE, page(sections, settings))
     return sections
 
 
@@ -75,8 +81,9 @@ def write_exhibit(out: Path, exhibit: Exhibit) -> None:
     write_text(out / NUMBERS / f"{exhibit.name}.csv", exhibit.table.csv())
     if exhibit.draw:
         figure = exhibit.draw(exhibit.table)
-        for suffix in (".svg", ".png"):
-            save(figure, out / FIGURES / f"{exhibit.name}{suffix}")
+        save(figure, out / FIGURES / f"{exhibit.name}.svg")
+        figure.set_layout_engine("none")  # its parts have their places now
+        save(figure, out / FIGURES / f"{exhibit.name}.png")
 
 
 def write_text(path: Path, text: str) -> None:
