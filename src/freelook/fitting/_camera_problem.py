@@ -95,8 +95,9 @@ class CameraProblem:
     def project(self, x: Floats) -> Floats:
         """(n, 2) pixels; NaN where there is no such lens."""
         lens = self.lens(x)
-        if lens is None:
-            return np.full_like(self.pixel, np.nan)
+        return np.full_like(self.pixel, np.nan) if lens is None else self._through(lens, x)
+
+    def _through(self, lens: Lens, x: Floats) -> Floats:
         theta, phi = self.angles(x)
         with np.errstate(all="ignore"):
             radius = radius_of(lens, theta)
@@ -122,21 +123,14 @@ class CameraProblem:
     ) -> Minimum:
         """The minimum from a start on, held to lenses that grow to theta_max (radians)."""
 
-        def shortfall(x: Floats) -> Floats:
+        def rows(x: Floats) -> tuple[Floats, Floats]:
             lens = self.lens(x)
             if lens is None:
-                return np.zeros(CELLS)
-            return 100 * self.size_px * slope_shortfall(lens, theta_max, least_slope)
+                return np.full(self.pixel.size, np.nan), np.zeros(CELLS)
+            shortfall = 100 * self.size_px * slope_shortfall(lens, theta_max, least_slope)
+            return (self.pixel - self._through(lens, x)).ravel(), shortfall
 
-        return minimise(
-            lambda x: self.residuals_px(x).ravel(),
-            start,
-            size=self.size_px,
-            loss=loss,
-            scale=scale,
-            constraints=shortfall,
-            effort=effort,
-        )
+        return minimise(rows, start, size=self.size_px, loss=loss, scale=scale, effort=effort)
 
     @property
     def _lens_size(self) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from ._models import (
     Bools,
     free_names,
     lens_with,
+    let_free,
     radius_of,
     round_parameters,
     slope_shortfall,
@@ -97,8 +99,9 @@ class CurveProblem:
     free: Bools
 
     @classmethod
-    def of(cls, data: CurveData, like: Lens) -> CurveProblem:
-        return cls(data, like, round_parameters(like, np.abs(data.theta)))
+    def of(cls, data: CurveData, like: Lens, held: Sequence[str] = ()) -> CurveProblem:
+        """All that changes the radius is free but what is held, by name."""
+        return cls(data, like, round_parameters(like, np.abs(data.theta)) & let_free(like, held))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -123,8 +126,12 @@ class CurveProblem:
         lens = self.lens(x)
         if lens is None:
             return np.full(np.shape(theta), np.nan)
+        return self._through(lens, self.offset_px(x), theta)
+
+    @staticmethod
+    def _through(lens: Lens, offset_px: float, theta: Floats) -> Floats:
         with np.errstate(all="ignore"):
-            return self.offset_px(x) + radius_of(lens, np.abs(theta)) * np.sign(theta)
+            return np.asarray(offset_px + radius_of(lens, np.abs(theta)) * np.sign(theta))
 
     def residuals_px(self, x: Floats) -> Floats:
         return self.data.position_px - self.curve(x, self.data.theta)
@@ -147,21 +154,14 @@ class CurveProblem:
     ) -> Minimum:
         """The minimum from a start on, held to lenses that grow to theta_max."""
         data = self.data
-
         size = data.size_px / float(np.median(data.sigma_px))
 
-        def shortfall(x: Floats) -> Floats:
+        def rows(x: Floats) -> tuple[Floats, Floats]:
             lens = self.lens(x)
             if lens is None:
-                return np.zeros(CELLS)
-            return 100 * size * slope_shortfall(lens, theta_max, least_slope)
+                return np.full(len(data.theta), np.nan), np.zeros(CELLS)
+            curve = self._through(lens, self.offset_px(x), data.theta)
+            shortfall = 100 * size * slope_shortfall(lens, theta_max, least_slope)
+            return (data.position_px - curve) / data.sigma_px, shortfall
 
-        return minimise(
-            lambda x: self.residuals_px(x) / data.sigma_px,
-            start,
-            size=size,
-            loss=data.loss,
-            scale=scale,
-            constraints=shortfall,
-            effort=effort,
-        )
+        return minimise(rows, start, size=size, loss=data.loss, scale=scale, effort=effort)

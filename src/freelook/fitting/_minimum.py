@@ -12,7 +12,8 @@ from scipy.optimize import least_squares
 from ..errors import FitError
 from ..lens import Floats
 
-Function = Callable[[Floats], Floats]
+# Parameters (p,) to the residuals (n,) of the data, and to values (m,) that should be 0.
+Rows = Callable[[Floats], tuple[Floats, Floats]]
 
 # Residuals of this many standard deviations are where a robust loss begins to differ from least
 # squares: soft_l1 then keeps about 95 % of the efficiency on normal noise.
@@ -86,31 +87,29 @@ class Minimum:
 
 
 def minimise(
-    values: Function,
+    rows: Rows,
     start: Floats,
     *,
     size: float,
     loss: str = "linear",
     scale: float | None = None,
-    constraints: Function | None = None,
     effort: tuple[float, int] = CLOSE,
 ) -> Minimum:
-    """The parameters that make `values` smallest, from `start` on.
+    """The parameters that make the residuals smallest, from `start` on.
 
-    values       parameters (p,) to residuals (n,); NaN where parameters make no sense
-    size         how large the fitted quantity is, in the residuals' unit: steps and the
-                 smallest noise believed (1e-9 of it) follow from it
-    loss         "linear" for least squares, "soft_l1" or "cauchy" against outliers
-    scale        where the loss turns; None: 1.5 robust standard deviations of the residuals,
-                 found along the way
-    effort       ROUGH, FAIR or CLOSE
-    constraints  parameters to values that should be 0; plain squares, whatever the loss
+    rows    residuals, NaN where parameters make no sense; and constraints, always as plain squares
+    size    how large the fitted quantity is, in the residuals' unit: steps and the smallest noise
+            believed (1e-9 of it) follow from it
+    loss    "linear" for least squares, "soft_l1" or "cauchy" against outliers
+    scale   where the loss turns; None: 1.5 robust standard deviations of the residuals, found
+            along the way
+    effort  ROUGH, FAIR or CLOSE
 
     FitError when the start makes no sense or the loss is unknown.
     """
     if loss not in LOSSES:
         raise FitError(f"unknown loss '{loss}'; known: {', '.join(LOSSES)}")
-    problem = _Problem(values, constraints, np.asarray(start, dtype=float), size)
+    problem = _Problem(rows, np.asarray(start, dtype=float), size)
     if loss == "linear":
         x = problem.solve(problem.start, loss, 1.0, effort)
         return problem.minimum(problem.polished(x) if effort == CLOSE else x, loss, 1.0)
@@ -146,10 +145,8 @@ def _loss(name: str, z: Floats) -> tuple[Floats, Floats, Floats]:
 class _Problem:
     """The least squares in units in which every parameter moves the data alike."""
 
-    def __init__(
-        self, values: Function, constraints: Function | None, start: Floats, size: float
-    ) -> None:
-        self._values, self._constraints = values, constraints
+    def __init__(self, rows: Rows, start: Floats, size: float) -> None:
+        self._parts = rows
         self.start, self._size = start, size
         self._count = len(self.values(start))
         if not np.isfinite(self.values(start)).all():
@@ -158,7 +155,7 @@ class _Problem:
 
     def values(self, x: Floats) -> Floats:
         with np.errstate(all="ignore"):
-            return np.asarray(self._values(x), dtype=float)
+            return np.asarray(self._parts(x)[0], dtype=float)
 
     def turn(self, x: Floats) -> float:
         """Where a robust loss turns, by the residuals there."""
@@ -216,10 +213,8 @@ class _Problem:
         return np.clip(rows, -limit, limit)
 
     def _raw(self, x: Floats) -> Floats:
-        if self._constraints is None:
-            return self.values(x)
         with np.errstate(all="ignore"):
-            return np.concatenate([self.values(x), self._constraints(x)])
+            return np.concatenate(self._parts(x))
 
     def _jacobian(self, x: Floats) -> Floats:
         """d rows / d y, by central differences; one-sided where one side makes no sense."""

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import MISSING, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FitError, ProfileError
-from ..lens import MODELS, Floats, Lens, RadialSpline, growth_limit, vector, with_vector
+from ..lens import MODELS, Floats, Lens, OCamCalib, RadialSpline, growth_limit, vector, with_vector
 
 # The slope that a fitted radius keeps at least, as a share of its mean slope.
 LEAST_SLOPE = 1e-3
 CELLS = 90
+FINE_KNOTS = 32
 RECTILINEAR = ("perspective", "poly3", "poly5", "ptlens", "opencv_rational")
 
 Bools = NDArray[np.bool_]
@@ -38,6 +40,13 @@ def default_lens(name: str, theta_max: float, knots: int) -> Lens:
     if sum(f.default is MISSING for f in fields(model)) > 1:  # type: ignore[arg-type]
         raise FitError(f"{name} has no lens to start a fit from")
     return model(1.0)  # type: ignore[call-arg]
+
+
+def fine_lens(name: str, theta_max: float) -> Lens:
+    """As `default_lens`, with as many knots or terms as help where there is no noise."""
+    if name == "ocamcalib":
+        return OCamCalib(1.0, (*OCamCalib.taylor, 0.0, 0.0, 0.0))
+    return default_lens(name, theta_max, FINE_KNOTS)
 
 
 def scaled(lens: Lens, factor: float) -> Lens | None:
@@ -120,6 +129,15 @@ def check_growth(lens: Lens, theta_max: float, model: str) -> None:
             f"{np.degrees(growth_end(lens, theta_max)):.2f} degrees from the axis; the data go to "
             f"{np.degrees(theta_max):.2f}"
         )
+
+
+def let_free(lens: Lens, held: Sequence[str]) -> Bools:
+    """(p,) bool: which entries of `vector(lens)` are not held; FitError for a name there is not."""
+    names = free_names(lens)
+    for name in held:
+        if name not in names:
+            raise FitError(f"this lens has no parameter '{name}' to hold; it has {names}")
+    return np.array([name not in held for name in names])
 
 
 def round_parameters(lens: Lens, theta: Floats) -> Bools:

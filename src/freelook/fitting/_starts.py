@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..errors import FitError
 from ..lens import Lens, RadialSpline, vector
 from ._curve_data import CurveData
-from ._models import default_lens, lens_with, radius_of, scaled
+from ._models import default_lens, fine_lens, lens_with, let_free, radius_of, scaled
 
 
 def starting_curves(
-    model: str, data: CurveData, knots: int | None = None, most: int = 3
+    model: str,
+    data: CurveData,
+    fine: bool = False,
+    held: Sequence[str] = (),
+    most: int = 3,
 ) -> list[tuple[Lens, float]]:
     """A few simple lenses of a model, with offsets in pixels.
 
@@ -21,7 +27,7 @@ def starting_curves(
     """
     found = [
         start
-        for shape in _shapes(model, data, knots)
+        for shape in _shapes(model, data, fine, held)
         if (start := _scaled(shape, data)) is not None
     ]
     if not found:
@@ -32,13 +38,19 @@ def starting_curves(
     return [(lens, offset) for _, lens, offset in kept]
 
 
-def _shapes(model: str, data: CurveData, knots: int | None) -> list[Lens]:
+def _shapes(model: str, data: CurveData, fine: bool, held: Sequence[str]) -> list[Lens]:
     """Lenses of a model with scale 1: all defaults, then one parameter changed at a time."""
-    plain = default_lens(model, data.theta_max, knots or knots_for(len(data.theta)))
+    plain = (
+        fine_lens(model, data.theta_max)
+        if fine
+        else default_lens(model, data.theta_max, knots_for(len(data.theta)))
+    )
     x = vector(plain)
     shapes: list[Lens | None] = [plain]
     if not isinstance(plain, RadialSpline):  # there every parameter is a radius
-        for change in np.diag(np.full(len(x), 0.3))[1:]:
+        changes = np.diag(np.full(len(x), 0.3))
+        changes[0] = 0  # the scale
+        for change in changes[let_free(plain, held) & changes.any(axis=1)]:
             shapes += [lens_with(plain, x + change), lens_with(plain, x - change)]
     return [shape for shape in shapes if shape is not None]
 

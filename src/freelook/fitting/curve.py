@@ -158,17 +158,21 @@ def fit_curve(
 
 
 def best_curve(
-    model: str, data: CurveData, knots: int | None = None
+    model: str, data: CurveData, *, fine: bool = False, held: Sequence[str] = ()
 ) -> tuple[CurveProblem, Minimum]:
-    """The deepest minimum found; whether its lens grows all the way is not yet looked at."""
+    """The deepest minimum found; whether its lens grows all the way is not yet looked at.
+
+    fine  as many knots or terms as help where there is no noise
+    held  parameters that stay at their defaults
+    """
     starts = [
-        (CurveProblem.of(data, lens), offset)
-        for lens, offset in starting_curves(model, data, knots)
+        (CurveProblem.of(data, lens, held), offset)
+        for lens, offset in starting_curves(model, data, fine, held)
     ]
     p, n = len(starts[0][0].names), len(data.theta)
     if n <= p:
         raise FitError(f"{model} has {p} parameters here; it needs {p + 1} points, not {n}")
-    starts += [_simpler(*starts[0])]
+    starts += _simpler(*starts[0])
     ends = [
         (problem, problem.fit(problem.start(problem.like, offset), data.theta_max, effort=ROUGH))
         for problem, offset in starts
@@ -177,18 +181,20 @@ def best_curve(
     return problem, problem.fit(found.x, data.theta_max)
 
 
-def _simpler(problem: CurveProblem, offset: float) -> tuple[CurveProblem, float]:
+def _simpler(problem: CurveProblem, offset: float) -> list[tuple[CurveProblem, float]]:
     """A start where the correcting terms, those that are 0 by default, are 0 and the rest fits.
 
     A model's simple kinds are found exactly from there, along no valley at all.
     """
     main = problem.free & (vector(problem.like) != 0)
+    if main.sum() == problem.free.sum():
+        return []
     simple = replace(problem, free=main)
     found = simple.fit(simple.start(problem.like, offset), problem.data.theta_max)
     lens = simple.lens(found.x)
     if lens is None:
-        return problem, offset
-    return replace(problem, like=lens), simple.offset_px(found.x)
+        return []
+    return [(replace(problem, like=lens), simple.offset_px(found.x))]
 
 
 def rank(fits: Sequence[CurveFit]) -> list[CurveFit]:

@@ -8,18 +8,19 @@ same lens to the last digits; where not, the differences that remain are measure
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..camera import Camera, make_camera
 from ..errors import FitError, ProfileError
-from ..lens import MODELS, BentLens, Floats, Lens, vector
+from ..lens import MODELS, BentLens, Floats, Lens
 from ..resolution import around_axis, inside_picture, places, ray_at, resolution_at, sample_places
 from ._camera_problem import STRETCHES, CameraProblem
 from ._curve_data import checked
 from ._minimum import Minimum
-from ._models import LEAST_SLOPE, growth_end, known_model, model_end, round_parameters
+from ._models import LEAST_SLOPE, growth_end, known_model, let_free, model_end, round_parameters
 from .curve import best_curve
 from .splined import refit_splined
 
@@ -27,7 +28,6 @@ from .splined import refit_splined
 # seldom better than 0.3 pixels, and a straight edge bent by half a pixel still looks straight.
 LIMIT_SHARE = 0.5e-3
 COLUMNS_FIT, COLUMNS_CHECK = 36, 150
-KNOTS = 32
 HOPELESS = 0.01  # of the picture: a lens that far off is not worth more tries
 LEAST_FIELD = np.radians(1.0)
 
@@ -72,12 +72,14 @@ def refit(
     *,
     theta_max: float | None = None,
     stretch: str = "skew",
+    held: Sequence[str] = (),
     limit: float | None = None,
 ) -> Refit:
     """The camera of a model that comes nearest to `camera`.
 
     theta_max  half of the field to keep, radians; None: all of it, or as far as the model goes
     stretch    what of the stretch is sought: "free", "skew" (upper triangle), "aspect" or "none"
+    held       parameters of the model that stay at their defaults, for formats that lack them
     limit      the difference in pixels that counts as none; None: half a pixel in 1000
 
     FitError when no lens of the model comes near. A poor fit is no error: look at `holds`.
@@ -90,7 +92,7 @@ def refit(
     if model == "splined_stereographic":
         found = refit_splined(camera, end, stretch)
     else:
-        found = _fitted(camera, model, field_rays(camera, end, COLUMNS_FIT), end, stretch)
+        found = _fitted(camera, model, field_rays(camera, end, COLUMNS_FIT), end, stretch, held)
     limit = limit_px(camera.size) if limit is None else limit
     return measure(replace(camera, theta_max=wanted), found, limit)
 
@@ -145,12 +147,15 @@ def _border(size: tuple[int, int], columns: int) -> Floats:
     return np.concatenate([np.stack(side, axis=-1) for side in sides])
 
 
-def _fitted(camera: Camera, model: str, rays: Floats, end: float, which: str) -> Camera:
+def _fitted(
+    camera: Camera, model: str, rays: Floats, end: float, which: str, held: Sequence[str]
+) -> Camera:
     pixel = camera.project(rays)
-    like = camera.lens if type(camera.lens) is MODELS[model] else _start(camera, model, end)
-    free = np.ones(len(vector(like)), bool)
+    same = type(camera.lens) is MODELS[model] and not held
+    like = camera.lens if same else _start(camera, model, end, held)
+    free = let_free(like, held)
     if not isinstance(camera.lens, BentLens):  # bent terms would only follow the picture's outline
-        free = round_parameters(like, np.linspace(0, end, 20))
+        free &= round_parameters(like, np.linspace(0, end, 20))
     problem = CameraProblem(rays, pixel, like, free, camera.stretch, which)
     x = problem.start(np.asarray(camera.center))
     found = problem.fit(x, end, loss="linear")
@@ -161,11 +166,11 @@ def _fitted(camera: Camera, model: str, rays: Floats, end: float, which: str) ->
     return camera_of(problem, found, camera, lens, end)
 
 
-def _start(camera: Camera, model: str, end: float) -> Lens:
+def _start(camera: Camera, model: str, end: float, held: Sequence[str]) -> Lens:
     """The lens of the model whose radius is nearest, its centre and stretch left aside."""
     theta = np.linspace(0, end, 101)[1:]
     data = checked(theta, camera.lens.radius(theta), None, False, "linear")
-    problem, found = best_curve(model, data, KNOTS)
+    problem, found = best_curve(model, data, fine=True, held=held)
     lens = problem.lens(found.x)
     assert lens is not None, "a fit ends where the parameters make sense"
     return lens
