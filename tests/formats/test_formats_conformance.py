@@ -10,6 +10,7 @@ import json
 import re
 import time
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -112,19 +113,40 @@ def test_what_is_written_is_read_back_the_same(name: str, text: str) -> None:
     assert largest_difference_px(again, camera) < 1e-9
 
 
+@cache
+def example_cameras(model: str) -> list[Camera]:
+    """Off centre, with pixels that are not square, and with a skew as well."""
+    stretches = (np.diag([1, 0.98]), np.array([[1, 0.01], [0, 0.97]]))
+    lenses = [example.lens for example in EXAMPLES[model]]
+    with contextlib.suppress(TypeError):  # splines have no defaults
+        lenses.append(MODELS[model](300.0))  # type: ignore[call-arg]
+    return [
+        make_camera(SIZE, lens, center=(300.25, 250.5), stretch=stretch, field_deg=60)
+        for lens in lenses
+        for stretch in stretches
+    ]
+
+
 @every_format
 @pytest.mark.parametrize("model", MODELS)
 def test_any_lens_is_written_exactly_or_refused(name: str, model: str) -> None:
     """A format may hold less of a model than there is (no k3, no skew); then it must say so."""
-    for example in EXAMPLES[model]:
-        for stretch in (np.eye(2), np.diag([1, 0.98]), np.array([[1, 0.01], [0, 0.97]])):
-            camera = make_camera(
-                SIZE, example.lens, center=(300.25, 250.5), stretch=stretch, field_deg=60
-            )
+    for camera in example_cameras(model):
+        with contextlib.suppress(ProfileError):
+            written = format_module(name).write(Profile(camera))
+            assert model in format_module(name).MODELS
+            assert largest_difference_px(read(written).camera, camera) < 1e-9
+
+
+@every_format
+def test_something_of_every_model_a_format_holds_is_written(name: str) -> None:
+    """Guards the test above against refusing everything."""
+    for model in format_module(name).MODELS:
+        written = []
+        for camera in example_cameras(model):
             with contextlib.suppress(ProfileError):
-                written = format_module(name).write(Profile(camera))
-                assert model in format_module(name).MODELS
-                assert largest_difference_px(read(written).camera, camera) < 1e-9
+                written.append(format_module(name).write(Profile(camera)))
+        assert written, model
 
 
 @every_format
@@ -362,16 +384,16 @@ def test_a_billion_laughs_in_a_sample_are_refused_at_once(name: str, text: str) 
 SWAMPS = {
     "[": "[" * 2**20,
     "a: [": "a: " + "[" * 2**20,
-    "numbers": "a: [" + "1.5, " * 100_000 + "1]",
-    "json numbers": "[" + "1.5, " * 400_000 + "1]",
-    "json objects": "[" + '{"a": 0}, ' * 200_000 + "0]",
+    "numbers": "a: [" + "1.5, " * 50_000 + "1]",
+    "json numbers": "[" + "1.5, " * 300_000 + "1]",
+    "json objects": "[" + '{"a": 0}, ' * 100_000 + "0]",
     "- ": "- " * 2**18,
-    "-": "-\n" * 2**18,
-    "a:": "".join(f"a{i}:\n" for i in range(2**16)),
+    "-": "-\n" * 2**17,
+    "a:": "".join(f"a{i}:\n" for i in range(2**15)),
     "spaces": " " * 2**22,
     "lines": "\n" * 2**20,
-    "words": "1 2 3.5\n" * 2**17,
-    "cameras": "1 PINHOLE 640 480 300 300 320 240\n" * 2**17,
+    "words": "1 2 3.5\n" * 2**16,
+    "cameras": "1 PINHOLE 640 480 300 300 320 240\n" * 2**15,
     "<a>": "<a>" * 2**18,
     "opencv_storage": "<opencv_storage>" + "<a>1</a>" * 2**16 + "</opencv_storage>",
     "lens": "<LensDescription>" * 2**15,
