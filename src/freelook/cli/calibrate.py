@@ -78,6 +78,12 @@ def run(args: argparse.Namespace) -> int:
         _print(calibration, found)
     if args.output:
         _write(args, calibration)
+    if args.report:
+        from ..report.calibration import calibration_page
+
+        title = f"Calibration of {args.name}" if args.name else "Lens calibration"
+        page = calibration_page(calibration, found.pictures, title)
+        Path(args.report).write_text(page, "utf-8")
     return 0
 
 
