@@ -15,11 +15,11 @@ LAYERS: list[set[str]] = [
     {"types", "errors", "clock"},
     {"lens", "camera", "viewport", "rotations", "mailbox", "axes", "pose_script"}
     | {"color", "datagrams", "latency", "plugins"},
-    {"renderers", "gimbal", "simulation", "media", "fitting", "plots"}
+    {"renderers", "gimbal", "simulation", "media", "fitting", "plots", "calibration"}
     | {"resolution", "view_cost", "comparison"},
     {"sources", "trackers", "sinks", "formats"},
     {"ingest", "head", "session", "offline"},
-    {"cli", "web", "bench", "paper", "doctor", "egl"},
+    {"cli", "web", "bench", "paper", "report", "doctor", "egl"},
 ]
 LAYER_OF = {name: number for number, names in enumerate(LAYERS) for name in names}
 PLUG_INS = LAYERS[3]
