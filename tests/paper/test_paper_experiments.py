@@ -8,6 +8,7 @@ import pytest
 from freelook.calibration.circle import find_circle
 from freelook.camera import Camera
 from freelook.fitting.curve import fit_curve
+from freelook.formats import load_camera
 from freelook.lens import Equidistant, Orthographic
 from freelook.paper import angles, distances, focal, points, polar, principal_point, printed, rig
 from freelook.paper.exhibit import Settings
@@ -22,6 +23,14 @@ def test_the_simulated_camera_is_that_of_the_paper() -> None:
     rim = float(camera.lens.radius(np.array(camera.theta_max)))
     assert 0 < rig.CENTER[1] - rim < rig.CENTER[1] + rim < 575  # inside, as the paper says
     assert camera.stretch[1, 1] / camera.stretch[0, 0] == pytest.approx(12 / 11)
+
+
+def test_the_built_in_profile_is_the_same_camera_with_its_axis_in_the_middle() -> None:
+    ours, built_in = rig.camera(), load_camera("paper-2011")
+    assert (ours.size, ours.lens) == (built_in.size, built_in.lens)
+    assert ours.theta_max == built_in.theta_max
+    np.testing.assert_allclose(ours.stretch, built_in.stretch, rtol=1e-15)
+    assert built_in.center == (359.5, 287.5)
 
 
 def test_readings_are_whole_pixels_with_the_stated_error(rng: np.random.Generator) -> None:

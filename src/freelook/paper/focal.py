@@ -61,7 +61,10 @@ def errors(settings: Settings) -> Table:
 @style()
 def draw(table: Table) -> Figure:
     figure, axes = chart(
-        "Error of equation 1, object at 10 cm", "object's size H, mm", "error of f, percent"
+        "Error of equation 1, object at 10 cm",
+        "object's size H, mm",
+        "error of f, percent",
+        height_in=4.2,
     )
     size, noise = table["object_mm"], table["reading_percent"]
     truth = table["equisolid_percent"]
@@ -71,8 +74,8 @@ def draw(table: Table) -> Figure:
     for model in FIVE:
         axes.plot(size, table[f"{model}_percent"], color=MODEL_COLORS[model], label=model)
     axes.plot(size, table["simulated_percent"], "k.", markersize=4, label="simulated")
-    axes.set(xlim=(0, size[-1]), ylim=(-12, 8))
-    axes.legend(loc="upper right", ncols=3)
+    axes.set(xlim=(0, size[-1]), ylim=(-12, 10))
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=4)
     return figure
 
 

@@ -78,7 +78,7 @@ def section(settings: Settings) -> Section:
             f"7, its 188 degrees are {tall.min():.0f} to {tall.max():.0f} rows high in a picture "
             f"of {printed.PICTURE_SIZE[1]}. Either the circle was cut above and below, or the "
             "pixels of section 3 are not those of the 720 × 576 picture.",
-            "The focal lengths that the printed curve gives, in such pixels, lie between: "
+            "The focal lengths that the printed curve gives, in such pixels, lie between the two: "
             f"{focal['equidistant']:.2f} mm if equidistant, {focal['equisolid']:.2f} if "
             f"equisolid, {focal['orthographic']:.2f} if orthographic.",
         ),

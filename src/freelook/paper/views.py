@@ -314,7 +314,8 @@ def section(settings: Settings) -> Section:
         exhibits=(
             Exhibit(
                 "fig15_full_view",
-                "Fig. 15: the full view, with what the views below take from it.",
+                "Fig. 15: the full view, with what the views below take from it. A tilted head's "
+                "crop is that of looking forward.",
                 outlines(LOOKS),
                 partial(draw_full, image=rgb24(first), title="Fig. 15: full view"),
                 picture=True,
