@@ -30,6 +30,7 @@ NOT_FINITE = re.compile(r"[-+]?\.(?:inf|nan)", re.IGNORECASE)
 STANDARD = "tag:yaml.org,2002:"
 KINDS = ("str", "int", "float", "bool", "null", "seq", "map")
 TAGS = frozenset([None, "!", *(STANDARD + kind for kind in KINDS)])  # they say nothing new
+AS_TEXT = ("!", STANDARD + "str")
 MATRIX = STANDARD + "opencv-"
 # the parser in C is ten times as fast; wheels have it, some systems' packages do not
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -112,10 +113,8 @@ def _mapping(events: Iterator[Any], depth: int) -> dict[str, Any]:
 
 def _scalar(event: Any) -> Any:
     _check_tag(event)
-    text = event.value
-    if not event.implicit[0] and event.tag in (None, "!", STANDARD + "str"):  # quoted
-        return text
-    return plain_value(text)
+    quoted = event.tag is None and not event.implicit[0]
+    return event.value if quoted or event.tag in AS_TEXT else plain_value(event.value)
 
 
 def plain_value(text: str) -> Any:
