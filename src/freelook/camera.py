@@ -241,8 +241,9 @@ def _angles_of(lens: BentLens, point: Floats, theta_max: float) -> tuple[Floats,
     has none.
     """
     shape = point.shape[:-1]
-    known = np.isfinite(point).all(axis=-1).reshape(-1)
-    point = np.where(known[:, None], point.reshape(-1, 2), 0.0)
+    point = point.reshape(-1, 2)
+    near = np.hypot(point[:, 0], point[:, 1]) < _farthest(lens, theta_max)  # and no NaN
+    point = np.where(near[:, None], point, 0.0)
     theta = angle_at_radius(lens, np.hypot(point[:, 0], point[:, 1]), theta_max)
     theta = np.where(np.isnan(theta), theta_max, theta)
     phi = np.arctan2(point[:, 1], point[:, 0])
@@ -253,9 +254,16 @@ def _angles_of(lens: BentLens, point: Floats, theta_max: float) -> tuple[Floats,
     if lost.any():
         p[lost] = _newton(lens, point[lost], np.zeros_like(p[lost]), reach)
     theta = 2 * np.arctan(np.hypot(p[:, 0], p[:, 1]))
-    closed = known & (_distance(lens, point, p, reach) < 1e-6)
+    closed = near & (_distance(lens, point, p, reach) < 1e-6)
     theta[~closed | (theta > theta_max + 1e-12)] = np.nan
     return theta.reshape(shape), np.arctan2(p[:, 1], p[:, 0]).reshape(shape)
+
+
+def _farthest(lens: BentLens, theta_max: float) -> float:
+    """A distance from the axis beyond which there is no image, pixels: a little outside the rim."""
+    phi = np.radians(np.arange(0, 360, 1.0))
+    point = image_point(lens, np.full_like(phi, theta_max), phi)
+    return float(1.01 * np.hypot(point[:, 0], point[:, 1]).max() + 1)
 
 
 def _newton(lens: BentLens, point: Floats, p: Floats, reach: float) -> Floats:

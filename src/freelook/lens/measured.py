@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from ..errors import ProfileError
 from ._roots import first_zero
 from .base import FIXED, Floats
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 # In units of f: farther out a Taylor lens is not looked at. tan(theta) = 10000 is 89.994 degrees.
 FARTHEST = 1e4
@@ -149,6 +152,8 @@ class RadialSpline:
 
     @cached_property
     def _spline(self) -> CubicSpline:
+        from scipy.interpolate import CubicSpline
+
         first = 1 if self.angles_deg[0] == 0 else 0
         theta = np.radians(self.angles_deg[first:])
         radius = np.array(self.radii_px[first:])

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from ..errors import ProfileError
 from .base import FIXED, Floats
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 # The mean over rings of directions is the round part. It only has to be near: the offset is
 # whatever is missing.
 DIRECTIONS = np.radians(np.arange(0, 180, 5.0))
 RINGS = 65
+PADDING = 2
 
 
 @dataclass(frozen=True)
@@ -96,7 +100,9 @@ class SplinedStereographic:
     @cached_property
     def _round(self) -> CubicSpline:
         """Mean distance from the axis, units of f, as a function of tan(theta/2), odd."""
-        # as far as the corner of the covered part; a straight line from there on
+        from scipy.interpolate import CubicSpline
+
+        # as far as the corner of the covered part; its last piece goes on from there
         inner = self._edge - self.spacing * (self.order - 1) / 2
         tangent = np.linspace(0.0, np.hypot(*inner) / 2, RINGS)
         direction = np.stack([np.cos(DIRECTIONS), np.sin(DIRECTIONS)], axis=-1)
@@ -113,30 +119,29 @@ class SplinedStereographic:
 
     def _surface(self, u: Floats) -> Floats:
         """du at u, both (..., 2)."""
-        control = np.reshape(self.control, (self.ny, self.nx, 2))
-        column, across = self._weights(u[..., 0], self.nx)
-        row, down = self._weights(u[..., 1], self.ny)
-        du = np.zeros_like(u)
-        for j, weight_y in enumerate(down):
-            for i, weight_x in enumerate(across):
-                du += (weight_x * weight_y)[..., None] * control[row + j, column + i]
-        return du
+        from scipy.ndimage import map_coordinates
 
-    def _weights(self, u: Floats, count: int) -> tuple[np.ndarray, list[Floats]]:
-        """The first control point that has a say at u along one axis, and all their weights."""
-        place = np.clip(u / self.spacing + (count - 1) / 2, 0, count - 1)
-        nearest = np.floor(place + 0.5) if self.order == 2 else np.floor(place)
-        # NaN goes through, by its distance from the middle
-        middle = np.clip(np.nan_to_num(nearest), 1, count - self.order).astype(int)
-        x = place - middle
-        weights = (
-            [(x - 0.5) ** 2 / 2, 0.75 - x * x, (x + 0.5) ** 2 / 2]
-            if self.order == 2
-            else [
-                (1 - x) ** 3 / 6,
-                2 / 3 - x * x * (1 - x / 2),
-                (1 + 3 * x * (1 + x * (1 - x))) / 6,
-                x**3 / 6,
-            ]
-        )
-        return middle - 1, weights
+        place = u.reshape(-1, 2) / self.spacing + (np.array([self.nx, self.ny]) - 1) / 2
+        known = np.isfinite(place)  # NaN comes out where it goes in
+        rows_columns = np.where(known, place, 0.0).T[::-1] + PADDING
+        du = [
+            map_coordinates(layer, rows_columns, order=self.order, prefilter=False)
+            for layer in self._padded
+        ]
+        return np.where(known, np.stack(du, axis=-1), np.nan).reshape(u.shape)
+
+    @cached_property
+    def _padded(self) -> Floats:
+        """Control points (2, rows, columns), continued so that the outermost polynomials go on."""
+        control = np.reshape(self.control, (self.ny, self.nx, 2))
+        return np.moveaxis(_continued(_continued(control, self.order, 0), self.order, 1), -1, 0)
+
+
+def _continued(control: Floats, order: int, axis: int) -> Floats:
+    """PADDING more control points at both ends: the next difference of the last ones is 0."""
+    last = np.array({2: [1.0, -3.0, 3.0], 3: [-1.0, 4.0, -6.0, 4.0]}[order])
+    points = list(np.moveaxis(control, axis, 0))
+    for _ in range(PADDING):
+        points.insert(0, np.tensordot(last[::-1], points[: order + 1], axes=1))
+        points.append(np.tensordot(last, points[-order - 1 :], axes=1))
+    return np.moveaxis(np.array(points), 0, axis)
