@@ -10,6 +10,21 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from reference_points import (
+    FISHEYE,
+    OMNI_D,
+    OMNI_K,
+    OMNI_PIXELS,
+    OMNI_XI,
+    PINHOLE,
+    RATIONAL,
+    SAME_PX,
+    by_fisheye,
+    by_pinhole,
+    matrix,
+    omni_rays,
+    rays,
+)
 
 from freelook.camera import Camera, make_camera
 from freelook.errors import ProfileError
@@ -25,16 +40,7 @@ from freelook.lens import (
     Perspective,
 )
 
-K = np.array([[280.0, 0, 318.25], [0, 276.5, 243.75], [0, 0, 1]])
-FISHEYE = np.array([-0.0137, 0.0207, -0.0128, 0.0025])
-# 4, 5, 8, 12 and 14 of OpenCV's coefficients: of a lens that is wide, tilted, decentred
-RATIONAL = [0.46, -0.21, 4e-3, -2e-3, 0.013, 0.54, -0.19, 0.012, 1e-3, -2e-4, 3e-3, 1e-4]
-RATIONAL += [0.01, -0.02]
-PINHOLE = [-0.21, 0.04, 4e-3, -2e-3, -0.003]
-
-# Projections differ by rounding only: both compute in double precision, and 1e-6 px is what the
-# last digit of a pixel number of 1e3 leaves a thousandfold of.
-SAME_PX = 1e-6
+K = matrix(280.0, 276.5, 318.25, 243.75)
 
 EVERY_KIND = pytest.mark.parametrize("suffix", [".yml", ".json", ".xml"])
 
@@ -46,25 +52,6 @@ def stored(path: Path, **values: Any) -> Path:
         storage.write(name, value)
     storage.release()
     return path
-
-
-def rays(half_field_rad: float) -> np.ndarray:
-    """(n, 3), up to a hair inside the field, all around."""
-    theta = np.linspace(0, half_field_rad * (1 - 1e-12), 90)[:, None]
-    phi = np.linspace(0, 2 * np.pi, 24, endpoint=False)
-    x, y = np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi)
-    return np.stack([x, y, np.broadcast_to(np.cos(theta), x.shape)], axis=-1).reshape(-1, 3)
-
-
-def by_fisheye(points: np.ndarray, d: Any, k: np.ndarray = K) -> np.ndarray:
-    still, alpha = np.zeros(3), float(k[0, 1] / k[0, 0])
-    found, _ = cv2.fisheye.projectPoints(points[:, None], still, still, k, d, alpha=alpha)
-    return np.asarray(found.reshape(-1, 2))
-
-
-def by_pinhole(points: np.ndarray, d: Any, k: np.ndarray = K) -> np.ndarray:
-    found, _ = cv2.projectPoints(points[:, None], np.zeros(3), np.zeros(3), k, np.array(d))
-    return np.asarray(found.reshape(-1, 2))
 
 
 def read(text: str, pick: str | None = None, size: tuple[int, int] | None = None) -> Profile:
@@ -81,7 +68,7 @@ def test_fisheye_as_opencv_writes_and_projects_it(suffix: str, skew: float, tmp_
         image_height=480,
         fisheye_model=1,
         camera_matrix=k,
-        distortion_coefficients=FISHEYE[:, None],
+        distortion_coefficients=np.array(FISHEYE)[:, None],
     )
     camera = load_profile(file).camera
     assert camera.lens == KannalaBrandt(280.0, *FISHEYE)
@@ -113,41 +100,25 @@ def test_ordinary_lenses_as_opencv_writes_and_projects_them(
     camera = load_profile(file).camera
     assert np.degrees(camera.theta_max) > 45
     points = rays(camera.theta_max)
-    np.testing.assert_allclose(camera.project(points), by_pinhole(points, d), atol=SAME_PX)
-
-
-# python -c, with opencv-contrib-python-headless 5.0.0.93 in an environment of its own:
-#   rays of (theta, phi) below; K, xi = 1.25 and D as in the test
-#   cv2.omnidir.projectPoints(rays[:, None], np.zeros(3), np.zeros(3), K, 1.25, D)[0].tolist()
-OMNIDIR = [
-    ((0, 0), (640.5, 479.25)),
-    ((10, 30), (694.3507053917033, 509.9250251137939)),
-    ((30, 100), (608.1995642538233, 662.007474796359)),
-    ((50, 200), (341.6866845486146, 372.0764247726315)),
-    ((70, 290), (794.6887088000515, 58.64576248683477)),
-    ((85, 5), (1199.6886382941684, 528.0107973847709)),
-    ((95, 50), (1050.3130371027223, 961.389126144202)),
-    ((105, 130), (182.50739836055476, 1019.7526182633474)),
-    ((110, 310), (1119.9051952269342, -85.86201918449865)),
-]
+    np.testing.assert_allclose(camera.project(points), by_pinhole(points, d, K), atol=SAME_PX)
 
 
 @EVERY_KIND
 def test_omnidir_as_opencv_writes_and_projects_it(suffix: str, tmp_path: Path) -> None:
     """Beyond 90 degrees as well: OpenCV's own function goes there."""
-    k = np.array([[800, 1.5, 640.5], [0, 790, 479.25], [0, 0, 1]])
-    d = np.array([[-0.12, 0.03, 1e-3, -5e-4]])
     file = stored(
-        tmp_path / f"f{suffix}", camera_matrix=k, distortion_coefficients=d, xi=1.25, rms=0.25
+        tmp_path / f"f{suffix}",
+        camera_matrix=OMNI_K,
+        distortion_coefficients=np.array([OMNI_D]),
+        xi=OMNI_XI,
+        rms=0.25,
     )
     profile = load_profile(file, size=(1280, 960))
     assert profile.camera.lens == Mei(800.0, 1.25, -0.12, 0.03, 0.0, 1e-3, -5e-4)
     assert "rms" in profile.notes[0]
     assert "0.25 pixels" in profile.notes[0]
-    theta, phi = np.radians([place for place, _ in OMNIDIR]).T
-    points = [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)]
-    pixels = profile.camera.project(np.stack(points, axis=-1))
-    np.testing.assert_allclose(pixels, [pixel for _, pixel in OMNIDIR], atol=SAME_PX)
+    pixels = profile.camera.project(omni_rays())
+    np.testing.assert_allclose(pixels, list(OMNI_PIXELS.values()), atol=SAME_PX)
 
 
 WRITTEN: list[tuple[Lens, str, int]] = [
@@ -208,13 +179,13 @@ def storage_text(**changes: Any) -> str:
     base: dict[str, Any] = {
         "image_width": 640,
         "image_height": 480,
-        "camera_matrix": matrix(K),
-        "distortion_coefficients": matrix([FISHEYE]),
+        "camera_matrix": cv_matrix(K),
+        "distortion_coefficients": cv_matrix([FISHEYE]),
     }
     return json.dumps({key: v for key, v in (base | changes).items() if v is not None})
 
 
-def matrix(rows: Any) -> dict[str, Any]:
+def cv_matrix(rows: Any) -> dict[str, Any]:
     rows = np.atleast_2d(rows)
     data = rows.ravel().tolist()
     sides = {"rows": rows.shape[0], "cols": rows.shape[1]}
@@ -248,7 +219,7 @@ SAID: list[tuple[dict[str, Any], type[Lens]]] = [
     ({"model": "pinhole"}, OpenCVRational),
     ({"distortion_model": "plumb_bob"}, OpenCVRational),
     ({"xi": 1.2}, Mei),
-    ({"xi": matrix([[1.2]])}, Mei),
+    ({"xi": cv_matrix([[1.2]])}, Mei),
     ({"xi": [[1.2]], "model": "mei"}, Mei),
     ({"model": "Meike 6.5 mm", "fisheye_model": 1}, KannalaBrandt),
 ]
@@ -260,20 +231,20 @@ def test_ways_to_say_which_lens_it_is(changes: dict[str, Any], model: type[Lens]
 
 
 SPELLINGS: list[dict[str, Any]] = [
-    {"K": matrix(K), "D": matrix([FISHEYE])},
-    {"cameraMatrix": matrix(K), "distCoeffs": matrix(FISHEYE[:, None])},
-    {"Camera_Matrix": matrix(K), "Distortion_Coefficients": matrix([FISHEYE])},
-    {"mtx": K.tolist(), "dist": [FISHEYE.tolist()]},
-    {"camera_matrix": K.tolist(), "dist_coeff": FISHEYE.tolist()},
-    {"camera_matrix": matrix(K), "D": {"type_id": "opencv-nd-matrix", "sizes": [4]}},
+    {"K": cv_matrix(K), "D": cv_matrix([FISHEYE])},
+    {"cameraMatrix": cv_matrix(K), "distCoeffs": cv_matrix([[k] for k in FISHEYE])},
+    {"Camera_Matrix": cv_matrix(K), "Distortion_Coefficients": cv_matrix([FISHEYE])},
+    {"mtx": K.tolist(), "dist": [FISHEYE]},
+    {"camera_matrix": K.tolist(), "dist_coeff": FISHEYE},
+    {"camera_matrix": cv_matrix(K), "D": {"type_id": "opencv-nd-matrix", "sizes": [4]}},
 ]
-SPELLINGS[-1]["D"]["data"] = FISHEYE.tolist()
+SPELLINGS[-1]["D"]["data"] = FISHEYE
 SIZES: list[dict[str, Any]] = [
     {"image_width": 640, "image_height": 480},
     {"image_Width": 640, "image_Height": 480},
     {"width": 640, "height": 480},
     {"image_size": [640, 480]},
-    {"imageSize": matrix([[640, 480]])},
+    {"imageSize": cv_matrix([[640, 480]])},
     {"resolution": [640, 480]},
 ]
 
@@ -294,21 +265,21 @@ def test_a_file_without_a_size_asks_for_it() -> None:
 
 
 def test_a_skew_that_opencv_ignores_is_told() -> None:
-    k = matrix([[280.0, 1.4, 318.25], [0, 276.5, 243.75], [0, 0, 1]])
+    k = cv_matrix([[280.0, 1.4, 318.25], [0, 276.5, 243.75], [0, 0, 1]])
     profile = read(storage_text(camera_matrix=k, fisheye_model=0))
     assert "skew of 1.4, which OpenCV ignores" in profile.notes[0]
     points = rays(profile.camera.theta_max)
     np.testing.assert_allclose(
-        profile.camera.project(points), by_pinhole(points, FISHEYE), atol=SAME_PX
+        profile.camera.project(points), by_pinhole(points, FISHEYE, K), atol=SAME_PX
     )
 
 
 def test_the_small_json_tells_what_it_takes_for_granted() -> None:
-    small: dict[str, Any] = {"K": K.tolist(), "D": FISHEYE.tolist(), "image_size_wh": [640, 480]}
+    small: dict[str, Any] = {"K": K.tolist(), "D": FISHEYE, "image_size_wh": [640, 480]}
     (note,) = read(json.dumps(small)).notes
     assert "taken for OpenCV's fisheye model" in note
     assert read(json.dumps(small | {"model": "fisheye"})).notes == ()
-    column = small | {"D": FISHEYE[:, None].tolist()}  # as cv2.fisheye.calibrate returns it
+    column = small | {"D": [[k] for k in FISHEYE]}  # as cv2.fisheye.calibrate returns it
     assert read(json.dumps(column)).camera.lens == KannalaBrandt(280.0, *FISHEYE)
 
 
@@ -320,18 +291,18 @@ FAULTS: list[tuple[dict[str, Any], str]] = [
     ({"model": "omnidir"}, "no xi, which an omnidir camera has"),
     ({"xi": "1"}, r"xi must be a list of 1 numbers, not '1'"),
     ({"xi": -1.5}, "does not grow with the angle"),
-    ({"K": matrix(K)}, "'camera_matrix' and 'K' mean the same thing; remove one"),
+    ({"K": cv_matrix(K)}, "'camera_matrix' and 'K' mean the same thing; remove one"),
     ({"distortion_coefficients": None}, r"no distortion coefficients \(distortioncoeff.*keys are:"),
-    ({"distortion_coefficients": matrix([[1.0] * 6])}, r"0 or 4 or 5 .* or 14 numbers, not 6"),
-    ({"distortion_coefficients": matrix([PINHOLE]), "fisheye_model": 1}, "must have 4 numbers"),
+    ({"distortion_coefficients": cv_matrix([[1.0] * 6])}, r"0 or 4 or 5 .* or 14 numbers, not 6"),
+    ({"distortion_coefficients": cv_matrix([PINHOLE]), "fisheye_model": 1}, "must have 4 numbers"),
     ({"distortion_coefficients": "k1"}, "must be a list of 0 to 32 numbers, not 'k1'"),
-    ({"camera_matrix": matrix(K[:2])}, "camera_matrix must be a list of 9 numbers"),
-    ({"camera_matrix": matrix(K) | {"rows": 4}}, r"must have rows \* cols = 12 numbers in data"),
-    ({"camera_matrix": matrix(K) | {"data": 1}}, r"must have rows \* cols = 9 numbers in data"),
-    ({"camera_matrix": matrix(K) | {"rows": "3"}}, "rows and cols of camera_matrix"),
-    ({"camera_matrix": matrix(K.T)}, r"must be \[fx, skew, cx, 0, fy, cy, 0, 0, 1\]"),
-    ({"camera_matrix": matrix(-K), "fisheye_model": 1}, r"must be \[fx, skew, cx"),
-    ({"camera_matrix": matrix(K * [[-1], [1], [1]])}, "must be positive, not -280"),
+    ({"camera_matrix": cv_matrix(K[:2])}, "camera_matrix must be a list of 9 numbers"),
+    ({"camera_matrix": cv_matrix(K) | {"rows": 4}}, r"must have rows \* cols = 12 numbers in data"),
+    ({"camera_matrix": cv_matrix(K) | {"data": 1}}, r"must have rows \* cols = 9 numbers in data"),
+    ({"camera_matrix": cv_matrix(K) | {"rows": "3"}}, "rows and cols of camera_matrix"),
+    ({"camera_matrix": cv_matrix(K.T)}, r"must be \[fx, skew, cx, 0, fy, cy, 0, 0, 1\]"),
+    ({"camera_matrix": cv_matrix(-K), "fisheye_model": 1}, r"must be \[fx, skew, cx"),
+    ({"camera_matrix": cv_matrix(K * [[-1], [1], [1]])}, "must be positive, not -280"),
     ({"image_width": 0, "fisheye_model": 1}, "image_width and image_height must be two whole"),
     ({"image_size": [1, 2, 3], "fisheye_model": 1}, "image_size must be a list of 2 numbers"),
 ]

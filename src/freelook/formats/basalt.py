@@ -47,7 +47,7 @@ class _Kind:
 
 
 def _ucm(fx: float, values: list[float]) -> Lens:
-    """Usenko et al. 2018, equation 7: u = fx x / (alpha d + (1 - alpha) z) + cx.
+    """Usenko et al. 2018, the unified model: u = fx x / (alpha d + (1 - alpha) z) + cx.
 
     Divided by 1 - alpha this is Mei's f x / (xi d + z) with xi = alpha / (1 - alpha) and
     f = fx / (1 - alpha).
