@@ -75,6 +75,14 @@ def test_yaml_with_opencvs_first_line(version: str) -> None:
     assert parse_yaml(text) == {"m": matrix}
 
 
+def test_aliases_stand_for_short_things() -> None:
+    """A program that has the same list twice writes it so."""
+    size = [640, 480]
+    text = yaml.safe_dump({"cam0": {"resolution": size}, "cam1": {"resolution": size}})
+    assert "*id001" in text
+    assert parse_yaml(text)["cam1"] == {"resolution": size}
+
+
 def test_lines_are_counted_with_opencvs_first_one() -> None:
     with pytest.raises(ProfileError, match="given twice in line 4"):
         parse_yaml("%YAML:1.0\n---\na: 1\na: 2\n")
@@ -86,11 +94,16 @@ def test_empty_documents_behind_the_first_are_nothing() -> None:
     assert parse_yaml("# nothing\n") is None
 
 
+CHAIN = "".join(f"{name}: &{name} {{}}\n" for name in "abcde")
 YAML_FAULTS = [
     ("a: 1\n---\nb: 2\n", "more than one YAML document"),
     ("a: 1\na: 2\n", "key 'a' is given twice in line 2"),
     ("? [1, 2]\n: 3\n", "a key must be a word in line 1"),
-    ("a: &x 1\nb: *x\n", r"aliases \(\*x in line 2\).*write out"),
+    ("a: *x\n", r"\*x in line 1 stands for nothing before it"),
+    ("a: &x [*x]\n", r"\*x in line 1 stands for nothing before it"),
+    ("a: &x " + "y" * 2000 + "\nb: [*x, *x, *x, *x, *x]\n", "aliases in line 2 make it too long"),
+    (CHAIN.format("[1, 2, 3]", *[f"[{f'*{name}, ' * 9}]" for name in "abcd"]), "aliases in line 5"),
+    (CHAIN.format("[1]", *["[" * 12 + f"*{name}" + "]" * 12 for name in "abcd"]), "too deeply"),
     ("a: !!python/object/apply:os.getcwd []\n", "tag tag:yaml.org,2002:python/object/apply:os.ge"),
     ("a: !!timestamp 2020-01-01\n", "tag .*timestamp in line 1 is not read here"),
     ("a: !mine 1\n", "tag !mine in line 1"),

@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 from xml.etree import ElementTree
 
 from ..errors import ProfileError
-from ._yaml import parse_yaml
+from ._yaml import is_deep, parse_yaml
 
 LARGEST_BYTES = 16 * 2**20  # with all its optimisation inputs an mrcal model has a few MiB
 LARGEST_TREE = 2 * 2**20  # JSON and XML take up to a second per MiB; profiles are far smaller
@@ -109,7 +109,7 @@ def parse_json(text: str) -> Any:
         raise ProfileError(f"not JSON: {error.msg} {where}") from None
     except ValueError as error:  # an integer of thousands of digits
         raise ProfileError(f"not JSON: {error}") from None
-    if _is_deep(value):
+    if is_deep(value, DEEPEST):
         raise ProfileError("nested too deeply to be a lens profile")
     return value
 
@@ -154,19 +154,6 @@ class _ShallowTree(ElementTree.TreeBuilder):
 def _check_length(text: str, what: str) -> None:
     if len(text) > LARGEST_TREE:
         raise ProfileError(f"more than {LARGEST_TREE >> 20} MiB of {what} are no lens profile")
-
-
-def _is_deep(value: Any) -> bool:
-    level = [value]
-    for _ in range(DEEPEST):
-        level = [child for item in level for child in _children(item)]
-        if not level:
-            return False
-    return True
-
-
-def _children(value: Any) -> list[Any]:
-    return list(value.values()) if isinstance(value, dict) else value if type(value) is list else []
 
 
 def _no_constant(text: str) -> NoReturn:

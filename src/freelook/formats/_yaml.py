@@ -2,7 +2,8 @@
 
 A plain scalar is null, true, false, a number or a text. PyYAML's own loaders would make dates,
 base-60 and octal numbers of what merely looks like it, take 1e-5 for a text, and build whatever a
-tag asks for. Here no tag means anything but OpenCV's matrices, and there are no aliases: a few
+tag asks for. Here no tag means anything but OpenCV's matrices. Aliases (*name) may stand for a few
+thousand letters in all, as they do where a program had one list twice: without such a bound a few
 lines of them stand for more than any memory holds.
 """
 
@@ -18,6 +19,7 @@ from ..errors import ProfileError
 
 LARGEST = 2**19  # characters; OpenCV writes every corner it saw into its files, which are larger
 DEEPEST = 32
+MOST_ALIASED = 10_000  # characters that all aliases stand for together
 
 INTEGER = re.compile(r"[-+]?[0-9]{1,400}")  # Python refuses to read thousands of digits
 FLOAT = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
@@ -44,7 +46,7 @@ def parse_yaml(text: str) -> Any:
     if len(text) > LARGEST:
         raise ProfileError(f"more than {LARGEST >> 10} kB of YAML are no lens profile")
     try:
-        return _only_document(yaml.parse(_without_version(text), Loader=_LOADER))
+        return _Reading(yaml.parse(_without_version(text), Loader=_LOADER)).only_document()
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         where = f" in line {mark.line + 1}, column {mark.column + 1}" if mark else ""
@@ -61,60 +63,100 @@ def _without_version(text: str) -> str:
     return "#" + text[1:] if text.startswith("%YAML") else text
 
 
-def _only_document(events: Iterator[Any]) -> Any:
-    """The first document; what follows may only be empty, as behind a last `---`."""
-    values = (_value(next(events), events, 0) for e in events if _starts_document(e))
-    first = next(values, None)
-    if any(value is not None for value in values):
-        raise ProfileError("more than one YAML document; a lens profile is one")
-    return first
+class _Reading:
+    """One pass over the events of a text."""
+
+    def __init__(self, events: Iterator[Any]) -> None:
+        self.events = events
+        self.letters = 0  # of all scalars so far
+        self.anchors: dict[str, tuple[Any, int]] = {}  # value, and how many letters it has
+        self.aliased = 0
+
+    def only_document(self) -> Any:
+        """The first document; what follows may only be empty, as behind a last `---`."""
+        values = (self.value(next(self.events), 0) for e in self.events if _starts_document(e))
+        first = next(values, None)
+        if any(value is not None for value in values):
+            raise ProfileError("more than one YAML document; a lens profile is one")
+        if self.aliased and is_deep(first, DEEPEST):
+            raise ProfileError("nested too deeply to be a lens profile")
+        return first
+
+    def value(self, event: Any, depth: int) -> Any:
+        if isinstance(event, yaml.AliasEvent):
+            return self.alias(event)
+        before = self.letters
+        value = self.new_value(event, depth)
+        if event.anchor is not None:
+            self.anchors[event.anchor] = value, self.letters - before
+        return value
+
+    def alias(self, event: Any) -> Any:
+        if event.anchor not in self.anchors:
+            raise ProfileError(f"*{event.anchor:.40}{_line(event)} stands for nothing before it")
+        value, letters = self.anchors[event.anchor]
+        self.letters += letters  # it may stand in another anchor's value
+        self.aliased += letters
+        if self.aliased > MOST_ALIASED:
+            raise ProfileError(f"YAML aliases{_line(event)} make it too long for a lens profile")
+        return value
+
+    def new_value(self, event: Any, depth: int) -> Any:
+        _check_tag(event)
+        if isinstance(event, yaml.ScalarEvent):
+            self.letters += len(event.value) + 1
+            return _scalar(event)
+        if depth == DEEPEST:
+            raise ProfileError("nested too deeply to be a lens profile")
+        self.letters += 1
+        if isinstance(event, yaml.SequenceStartEvent):
+            return self.sequence(depth)
+        mapping = self.mapping(depth)
+        if event.tag and event.tag.startswith(MATRIX):
+            mapping["type_id"] = event.tag.removeprefix(STANDARD)
+        return mapping
+
+    def sequence(self, depth: int) -> list[Any]:
+        items = []
+        while not isinstance(event := next(self.events), yaml.SequenceEndEvent):
+            items.append(self.value(event, depth + 1))
+        return items
+
+    def mapping(self, depth: int) -> dict[str, Any]:
+        items: dict[str, Any] = {}
+        while not isinstance(event := next(self.events), yaml.MappingEndEvent):
+            if not isinstance(event, yaml.ScalarEvent):
+                raise ProfileError(f"a key must be a word{_line(event)}")
+            if event.value in items:
+                raise ProfileError(f"key '{event.value:.80}' is given twice{_line(event)}")
+            self.letters += len(event.value) + 1
+            items[event.value] = self.value(next(self.events), depth + 1)
+        return items
 
 
 def _starts_document(event: Any) -> bool:
     return isinstance(event, yaml.DocumentStartEvent)
 
 
-def _value(event: Any, events: Iterator[Any], depth: int) -> Any:
-    if isinstance(event, yaml.ScalarEvent):
-        return _scalar(event)
-    if isinstance(event, yaml.AliasEvent):
-        raise ProfileError(
-            f"YAML aliases (*{event.anchor}{_line(event)}) are not read in lens profiles; "
-            "write out what it stands for"
-        )
-    if depth == DEEPEST:
-        raise ProfileError("nested too deeply to be a lens profile")
-    _check_tag(event)
-    if isinstance(event, yaml.SequenceStartEvent):
-        return _sequence(events, depth)
-    mapping = _mapping(events, depth)
-    if event.tag and event.tag.startswith(MATRIX):
-        mapping["type_id"] = event.tag.removeprefix(STANDARD)
-    return mapping
-
-
-def _sequence(events: Iterator[Any], depth: int) -> list[Any]:
-    items = []
-    while not isinstance(event := next(events), yaml.SequenceEndEvent):
-        items.append(_value(event, events, depth + 1))
-    return items
-
-
-def _mapping(events: Iterator[Any], depth: int) -> dict[str, Any]:
-    items: dict[str, Any] = {}
-    while not isinstance(event := next(events), yaml.MappingEndEvent):
-        if not isinstance(event, yaml.ScalarEvent):
-            raise ProfileError(f"a key must be a word{_line(event)}")
-        if event.value in items:
-            raise ProfileError(f"key '{event.value:.80}' is given twice{_line(event)}")
-        items[event.value] = _value(next(events), events, depth + 1)
-    return items
-
-
 def _scalar(event: Any) -> Any:
-    _check_tag(event)
     quoted = event.tag is None and not event.implicit[0]
     return event.value if quoted or event.tag in AS_TEXT else plain_value(event.value)
+
+
+def is_deep(value: Any, levels: int) -> bool:
+    """Whether lists and mappings stand in each other more than so many times."""
+    level = [value]
+    for _ in range(levels):
+        level = [child for item in level for child in _children(item)]
+        if not level:
+            return False
+    return True
+
+
+def _children(value: Any) -> list[Any]:
+    if isinstance(value, dict):
+        return list(value.values())
+    return value if isinstance(value, list) else []
 
 
 def plain_value(text: str) -> Any:
