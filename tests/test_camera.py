@@ -322,6 +322,17 @@ class TestBentLenses:
         np.testing.assert_allclose(grid(p), exact, atol=1e-5)
         np.testing.assert_array_equal(grid(np.array([9.0, -9.0])), grid.offsets[0, -1])
 
+    def test_grid_goes_straight_on_beyond_the_rim(self, camera: Camera) -> None:
+        """Renderers interpolate over the rim, from places nobody sees: no kink there."""
+        assert camera.grid is not None
+        offsets = camera.grid.offsets.astype(float)
+        last = len(offsets) - 1
+        first = int(last * (1 + (1 + 3 / last) / np.sqrt(2)) / 2) + 1  # on the diagonal
+        steps = np.diff(offsets[range(first, last + 1), range(first, last + 1)], axis=0)
+        assert len(steps) >= 2
+        assert np.abs(steps).max() > 1e-3
+        np.testing.assert_allclose(steps, steps[:1].repeat(len(steps), 0), rtol=0.01, atol=1e-4)
+
     def test_far_corners_of_the_picture_decide_the_field(self, camera: Camera) -> None:
         small = make_camera((300, 200), camera.lens)
         corners = small.ray(np.array([[x, y] for x in (-0.5, 299.5) for y in (-0.5, 199.5)]))

@@ -152,8 +152,17 @@ def _square(p_max: float, size: int) -> Floats:
 
 
 def _offset_at(lens: BentLens, p: Floats, reach: float) -> Floats:
-    theta = 2 * np.arctan(np.minimum(np.hypot(p[..., 0], p[..., 1]), reach))
-    return np.asarray(lens.offset(theta, np.arctan2(p[..., 1], p[..., 0])))
+    """Offsets at p (..., 2); from |p| = reach on they go straight on.
+
+    Nobody sees those, but a kink would spoil the interpolation next to the rim.
+    """
+    phi, length = np.arctan2(p[..., 1], p[..., 0]), np.hypot(p[..., 0], p[..., 1])
+    step = 1e-4 * reach
+    inner, held = (
+        lens.offset(2 * np.arctan(np.minimum(length, end)), phi) for end in (reach - step, reach)
+    )
+    beyond = np.maximum(length - reach, 0)[..., None]
+    return np.asarray(held + (held - inner) * (beyond / step))
 
 
 @dataclass(frozen=True)
