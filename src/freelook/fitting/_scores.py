@@ -16,8 +16,10 @@ from scipy.special import gammaln
 
 from ..lens import Floats
 from ._minimum import Minimum, spread
+from ._models import Bools
 
 TAIL = 5.0
+OVERFIT = 1.5
 
 
 def log_likelihood(residuals: Floats, loss: str, floor: float) -> float:
@@ -29,7 +31,12 @@ class Scored:
     """What a fit says about its parameters and about itself, from the minimum it ended in."""
 
     names: tuple[str, ...]
+    residuals_px: Floats
     _minimum: Minimum
+
+    @property
+    def cv_residuals_px(self) -> Floats:
+        raise NotImplementedError
 
     @property
     def _log_likelihood(self) -> float:
@@ -73,6 +80,42 @@ class Scored:
         return spread(self._residuals, len(self.names))
 
     @property
+    def rms_px(self) -> float:
+        """Root mean square of the residuals: of distances, where those have two coordinates."""
+        return _rms(self.residuals_px)
+
+    @property
+    def cv_rms_px(self) -> float:
+        """Root mean square of `cv_residuals_px`: how well unmeasured points are predicted."""
+        return _rms(self.cv_residuals_px)
+
+    @property
+    def exact(self) -> bool:
+        """Whether there is no noise to speak of: not a millionth of the data's extent."""
+        return self.noise_px < 1e-6 * self._size_px
+
+    @property
+    def outliers(self) -> Bools:
+        """(n,) bool: points farther off than five times the noise."""
+        off_px = _lengths(self.residuals_px)
+        return np.asarray(off_px > 5 * self.noise_px) & (not self.exact)
+
+    @property
+    def cv_ratio(self) -> float:
+        """How many times farther off points are that the fit has not seen; outliers left out."""
+        kept = ~self.outliers
+        seen = _rms(self.residuals_px[kept])
+        return 1.0 if self.exact else _rms(self.cv_residuals_px[kept]) / seen
+
+    @property
+    def overfit(self) -> bool:
+        """Whether there are too many parameters for so few points: a ratio above 1.5.
+
+        That is what one parameter for every three points gives.
+        """
+        return self.cv_ratio > OVERFIT
+
+    @property
     def aic(self) -> float:
         return 2 * self._k - 2 * self._log_likelihood
 
@@ -87,12 +130,25 @@ class Scored:
         return float(self._k * np.log(len(self._residuals)) - 2 * self._log_likelihood)
 
     @property
+    def _size_px(self) -> float:
+        """How far the measured pixels extend."""
+        raise NotImplementedError
+
+    @property
     def _residuals(self) -> Floats:
         return self._minimum.values
 
     @property
     def _k(self) -> int:
         return self._minimum.rank + 1
+
+
+def _lengths(residuals: Floats) -> Floats:
+    return np.asarray(np.linalg.norm(residuals.reshape(len(residuals), -1), axis=1))
+
+
+def _rms(residuals: Floats) -> float:
+    return float(np.sqrt(np.mean(_lengths(residuals) ** 2)))
 
 
 def _normal(residuals: Floats, floor: float) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 
@@ -18,6 +19,8 @@ from ._starts import starting_curves
 
 # With more points than this, ten groups are left out in turn instead of single points.
 MOST_SINGLE = 40
+
+AnyFit = TypeVar("AnyFit", bound=Scored)
 
 
 # Models that say nothing new about a curve: a surface, and one whose round part is another model.
@@ -53,10 +56,6 @@ class CurveFit(Scored):
     theta_max: float
     _problem: CurveProblem = field(repr=False)
     _minimum: Minimum = field(repr=False)
-
-    @property
-    def rms_px(self) -> float:
-        return float(np.sqrt(np.mean(self.residuals_px**2)))
 
     @property
     def noise_px(self) -> float:
@@ -105,9 +104,18 @@ class CurveFit(Scored):
         return residuals
 
     @property
-    def cv_rms_px(self) -> float:
-        """Root mean square of `cv_residuals_px`: how well unmeasured points are predicted."""
-        return float(np.sqrt(np.mean(self.cv_residuals_px**2)))
+    def measured(self) -> tuple[Floats, Floats]:
+        """(theta in radians, position in pixels) of the points, in the order given."""
+        return self._problem.data.theta, self._problem.data.position_px
+
+    @property
+    def radial_residuals_px(self) -> Floats:
+        """(n,) measured minus fitted, away from the axis."""
+        return self.residuals_px
+
+    @property
+    def _size_px(self) -> float:
+        return self._problem.data.size_px
 
     @cached_property
     def _log_likelihood(self) -> float:
@@ -197,13 +205,13 @@ def _simpler(problem: CurveProblem, offset: float) -> list[tuple[CurveProblem, f
     return [(replace(problem, like=lens), simple.offset_px(found.x))]
 
 
-def rank(fits: Sequence[CurveFit]) -> list[CurveFit]:
+def rank(fits: Sequence[AnyFit]) -> list[AnyFit]:
     """Best first, by AICc; they must be fits of the same points with the same loss.
 
     Two whose AICc differ by less than 2 cannot be told apart by these data (Burnham and Anderson,
     Model Selection and Multimodel Inference, 2002, section 2.6).
     """
-    if len({(len(fit.residuals_px), fit._problem.data.loss) for fit in fits}) > 1:
+    if len({(len(fit.residuals_px), fit._minimum.loss) for fit in fits}) > 1:
         raise FitError("only fits of the same points, with the same loss, can be ranked")
     return sorted(fits, key=lambda fit: (fit.aicc, len(fit.names)))
 

@@ -15,7 +15,7 @@ from ..rotations import RDF_FROM_FRD
 from ._camera_problem import STRETCHES, CameraProblem
 from ._curve_data import checked
 from ._minimum import FAIR, LOSSES, Minimum
-from ._models import LEAST_SLOPE, check_end, check_growth, grows, known_model
+from ._models import LEAST_SLOPE, check_end, check_growth, grows, known_model, radius_of
 from ._scores import Scored, log_likelihood
 from .curve import best_curve
 
@@ -43,11 +43,6 @@ class PointFit(Scored):
     _problem: CameraProblem = field(repr=False)
     _minimum: Minimum = field(repr=False)
 
-    @property
-    def rms_px(self) -> float:
-        """Of the distances between measured and projected points."""
-        return _rms(self.residuals_px)
-
     @cached_property
     def cv_residuals_px(self) -> Floats:
         """(n, 2) how far each point is from a fit that has not seen it: ten groups in turn."""
@@ -73,9 +68,44 @@ class PointFit(Scored):
         return residuals
 
     @property
-    def cv_rms_px(self) -> float:
-        """Of the distances in `cv_residuals_px`: how well unmeasured points are predicted."""
-        return _rms(self.cv_residuals_px)
+    def measured(self) -> tuple[Floats, Floats]:
+        """(theta in radians, radius in pixels) of the points, before centre and stretch."""
+        theta, _ = self._problem.angles(self._minimum.x)
+        return theta, np.linalg.norm(self._image_points, axis=1)
+
+    def __call__(self, theta: Floats) -> Floats:
+        """The lens's radius at angles in radians, pixels."""
+        return radius_of(self.camera.lens, np.asarray(theta, dtype=float))
+
+    def band(self, theta: Floats) -> Floats:
+        """Standard deviation of that radius, from the covariance; centre and stretch left aside."""
+        theta = np.asarray(theta, dtype=float)
+        x, count = self._minimum.x, int(self._problem.free.sum())
+        slopes = []
+        for step in np.diag(self._minimum.step)[:count]:
+            ahead, behind = self._problem.lens(x + step), self._problem.lens(x - step)
+            if ahead is None or behind is None:
+                return np.full(theta.shape, np.nan)
+            slopes.append((radius_of(ahead, theta) - radius_of(behind, theta)) / (2 * step.max()))
+        part = self.covariance[:count, :count]
+        variance = np.einsum("i...,ij,j...->...", np.stack(slopes), part, np.stack(slopes))
+        return np.asarray(np.sqrt(np.maximum(variance, 0)))
+
+    @property
+    def radial_residuals_px(self) -> Floats:
+        """(n,) the part of the residuals that points away from the axis."""
+        point = self._image_points
+        away = point / np.maximum(np.linalg.norm(point, axis=1), 1e-12)[:, None]
+        return np.asarray(np.sum(self.residuals_px * away, axis=1))
+
+    @property
+    def _image_points(self) -> Floats:
+        camera = self.camera
+        return (self._problem.pixel - camera.center) @ np.linalg.inv(camera.stretch).T
+
+    @property
+    def _size_px(self) -> float:
+        return self._problem.size_px
 
     @cached_property
     def _log_likelihood(self) -> float:
@@ -223,7 +253,3 @@ def _camera(
         )
     except ProfileError as error:
         raise FitError(f"{model}: {error}") from None
-
-
-def _rms(offsets: Floats) -> float:
-    return float(np.sqrt(np.mean(np.sum(offsets**2, axis=1))))
