@@ -149,6 +149,8 @@ def _notes(cam: dict[str, Any]) -> list[str]:
 def _said(lens: Lens) -> tuple[tuple[str, str], list[float], list[float]]:
     """(camera_model and distortion_model, what stands before fu, distortion_coeffs)."""
     if isinstance(lens, DoubleSphere):
+        if not 0 <= lens.alpha < 1:
+            raise ProfileError(f"Kalibr refuses an alpha outside [0, 1) of ds: {lens.alpha}")
         return ("ds", "none"), [lens.xi, lens.alpha], []
     if isinstance(lens, ExtendedUnified):
         return ("eucm", "none"), [lens.alpha, lens.beta], []

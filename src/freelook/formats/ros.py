@@ -166,12 +166,11 @@ def _notes(info: dict[str, Any]) -> list[str]:
         notes.append("the rectification is not used: the picture is taken to be the raw one")
     binning = [info["binning_x"], info["binning_y"]]
     if any(step not in (None, 0, 1) for step in binning):
-        notes.append(f"binning {binning}: the numbers are for the picture before it")
-    roi = info["roi"]
-    if isinstance(roi, dict) and any(roi.get(side) for side in ("width", "height")):
-        notes.append(
-            f"roi {roi}: the numbers are for the whole picture, not for this part of it"[:200]
-        )
+        notes.append(f"binning {binning!s:.40}: the numbers are for the picture before it")
+    roi = info["roi"] if isinstance(info["roi"], dict) else {}
+    whole = ([0, 0], [None, None], [info["width"], info["height"]])
+    if [roi.get("width"), roi.get("height")] not in whole:
+        notes.append("a roi is set: the numbers are for the whole picture, not for that part of it")
     return notes
 
 
