@@ -235,9 +235,12 @@ FAULTS: list[tuple[dict[str, Any], str]] = [
     (cam("ds", "none", FUFV, []), r"intrinsics \[xi, alpha, fu, fv, pu, pv\] of cam0 must be a li"),
     (
         cam("pinhole", "radtan", FUFV, PINHOLE),
-        "distortion_coeffs of cam0 must have 4 numbers, not 5",
+        "distortion_coeffs of cam0 must be a list of 4 numbers",
     ),
-    (cam("pinhole", "none", FUFV, FISHEYE), "distortion_coeffs of cam0 must have 0 numbers, not 4"),
+    (
+        cam("pinhole", "none", FUFV, FISHEYE),
+        "distortion_coeffs of cam0 must be a list of 0 numbers",
+    ),
     (cam("pinhole", "fov", FUFV, [4.0]), "does not grow with the angle"),
     (cam("ds", "none", [-1.5, 0.5, *FUFV], []), "DoubleSphere.*does not grow with the angle"),
     (cam("omni", "none", [-1.5, *FUFV], []), "does not grow with the angle"),

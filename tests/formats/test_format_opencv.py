@@ -293,8 +293,14 @@ FAULTS: list[tuple[dict[str, Any], str]] = [
     ({"xi": -1.5}, "does not grow with the angle"),
     ({"K": cv_matrix(K)}, "'camera_matrix' and 'K' mean the same thing; remove one"),
     ({"distortion_coefficients": None}, r"no distortion coefficients \(distortioncoeff.*keys are:"),
-    ({"distortion_coefficients": cv_matrix([[1.0] * 6])}, r"0 or 4 or 5 .* or 14 numbers, not 6"),
-    ({"distortion_coefficients": cv_matrix([PINHOLE]), "fisheye_model": 1}, "must have 4 numbers"),
+    (
+        {"distortion_coefficients": cv_matrix([[1.0] * 6])},
+        r"0 or 4 or 5 .* or 14 numbers, not of 6",
+    ),
+    (
+        {"distortion_coefficients": cv_matrix([PINHOLE]), "fisheye_model": 1},
+        "must be a list of 4 numbers",
+    ),
     ({"distortion_coefficients": "k1"}, "must be a list of 0 to 32 numbers, not 'k1'"),
     ({"camera_matrix": cv_matrix(K[:2])}, "camera_matrix must be a list of 9 numbers"),
     ({"camera_matrix": cv_matrix(K) | {"rows": 4}}, r"must have rows \* cols = 12 numbers in data"),

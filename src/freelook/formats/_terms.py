@@ -60,7 +60,7 @@ def coefficients(values: object, counts: Sequence[int], where: str) -> list[floa
         found.pop()
     if len(found) not in counts:
         wanted = " or ".join(map(str, counts))
-        raise ProfileError(f"{where} must have {wanted} numbers, not {len(found)}")
+        raise ProfileError(f"{where} must be a list of {wanted} numbers, not of {len(found)}")
     return found
 
 
