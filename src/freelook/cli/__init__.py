@@ -15,7 +15,11 @@ from importlib import import_module
 from .. import __version__
 from ..errors import FreelookError, MissingExtra
 
-COMMANDS = ("demo", "fly", "render", "simulate", "lens", "calibrate", "paper", "bench", "doctor")
+COMMANDS = (
+    *("demo", "fly", "render", "simulate", "lens"),
+    *("calibrate", "calibrate mount"),
+    *("paper", "bench", "doctor"),
+)
 
 EXTRA_OF = {
     "aiohttp": "web",
