@@ -206,7 +206,7 @@ FAULTS = [
     (opencv(model="pinhole radtan"), r"only OpenCV's fisheye model"),
     (opencv(K=[[1, 2, 3]]), r"K must be three rows of three numbers"),
     (opencv(K=[[-280, 0, 318], [0, 276, 243], [0, 0, 1]]), r"must be positive"),
-    (opencv(D=[0.1, 0.2]), r"D must have 4 numbers, not 2"),
+    (opencv(D=[0.1, 0.2]), r"D must be a list of 4 numbers"),
     ("", r"not a format known here .*: it is empty"),
     ('{"freelook_lens": 1,\n "size": [10', r"not JSON: .* line 2, column 13"),
     ("[1, 2]", r"not a format known here .*: a list"),
