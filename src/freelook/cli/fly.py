@@ -11,7 +11,7 @@ import asyncio
 import contextlib
 import threading
 import webbrowser
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -63,10 +63,11 @@ def add_flying_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--hfov", type=float, default=90.0, metavar="DEG", help="horizontal field of view at start"
     )
-    _add_serving_arguments(parser)
+    add_serving_arguments(parser)
 
 
-def _add_serving_arguments(parser: argparse.ArgumentParser) -> None:
+def add_serving_arguments(parser: argparse._ActionsContainer) -> None:
+    """Where the page is served, and to whom."""
     parser.add_argument(
         "--port",
         type=int,
@@ -122,30 +123,41 @@ def fly(
 
     `explain(state of the source)` may replace what is printed about the source.
     """
-    from ..web.serving import open_door, serve
+    from ..web.server import make_app
+    from ..web.serving import serve
     from ..web.station import Station
 
     Viewport((16, 9), about.hfov_deg)  # says what is wrong with it
     settings = GimbalSettings(hold_s=about.hold_s, ease_s=about.ease_s)
     with contextlib.ExitStack() as opened, StatusLine() as line:
         heads = open_heads(args.tracker, settings, opened)
-        door = open_door(
-            args.host,
-            args.port,
-            token=args.token,
-            tls=args.tls,
-            certificate=args.cert,
-            key=args.key,
-        )
-        opened.enter_context(door.socket)
+        door = opened.enter_context(opened_door(args))
+        station = Station(ingest, camera, heads, about)
         serving = serve(
-            Station(ingest, camera, heads, about),
+            make_app(station, door.guard),
             door,
             ready=lambda: announce(door, not args.no_browser),
-            report=lambda station: line.show(summary(station, explain)),
+            report=lambda: line.show(summary(station, explain)),
             until=until,
         )
         asyncio.run(serving)
+
+
+@contextlib.contextmanager
+def opened_door(args: argparse.Namespace) -> Iterator[Door]:
+    """Where to listen, from the arguments of `add_serving_arguments`."""
+    from ..web.serving import open_door
+
+    door = open_door(
+        args.host,
+        args.port,
+        token=args.token,
+        tls=args.tls,
+        certificate=args.cert,
+        key=args.key,
+    )
+    with door.socket:
+        yield door
 
 
 def open_heads(
@@ -165,13 +177,13 @@ def _free_name(kind: str, taken: dict[str, Head]) -> str:
     return next(name for name in names if name not in taken)
 
 
-def announce(door: Door, open_browser: bool) -> None:
+def announce(door: Door, open_browser: bool, *, webrtc: bool = True) -> None:
     from ..web.security import local_addresses
     from ..web.serving import can_open_browser
 
     for url in door.urls:
         say(f"view: {url}")
-    if not local_addresses():
+    if webrtc and not local_addresses():
         say(
             "this machine has no network address, and browsers take WebRTC video only over one: "
             "switch on any network, it need not lead anywhere"

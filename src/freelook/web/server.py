@@ -30,21 +30,29 @@ HEADERS = {
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 STATION = web.AppKey("station", Station)
 GUARD = web.AppKey("guard", Guard)
+PAGE = web.AppKey("page", str)
 
 
 def make_app(station: Station, guard: Guard) -> web.Application:
     """The whole application; starting and closing it starts and closes the station."""
-    app = web.Application(middlewares=[_with_headers, _guarded], client_max_size=LARGEST_BODY)
+    app = guarded_app(guard, "index.html")
     app[STATION] = station
-    app[GUARD] = guard
     app.cleanup_ctx.append(_running_station)
-    app.router.add_get("/", _index)
-    app.router.add_get("/view.glsl", _shader)
     app.router.add_get("/api/station", _about)
     app.router.add_post("/api/control", _control)
     app.router.add_post("/whep", _whep_post)
     app.router.add_options("/whep", _whep_options)
     app.router.add_delete("/whep/{session}", _whep_delete)
+    return app
+
+
+def guarded_app(guard: Guard, page: str) -> web.Application:
+    """What all stations share: a page, its files, the headers, and who may come in."""
+    app = web.Application(middlewares=[_with_headers, _guarded], client_max_size=LARGEST_BODY)
+    app[GUARD] = guard
+    app[PAGE] = page
+    app.router.add_get("/", _index)
+    app.router.add_get("/view.glsl", _shader)
     if STATIC.is_dir():
         app.router.add_static("/static/", STATIC)
     return app
@@ -86,7 +94,7 @@ async def _guarded(request: web.Request, handler: Handler) -> web.StreamResponse
         given = _bearer(request) if request.path != "/" else request.query.get("token", "")
         if not guard.accepts(given):
             raise web.HTTPUnauthorized(
-                text="a token is needed: open the whole address that 'freelook fly' printed, "
+                text="a token is needed: open the whole address that freelook printed, "
                 "or send 'Authorization: Bearer TOKEN'\n",
                 headers={"WWW-Authenticate": "Bearer"},
             )
@@ -104,7 +112,7 @@ def _bearer(request: web.Request) -> str:
 
 
 async def _index(request: web.Request) -> web.StreamResponse:
-    page = STATIC / "index.html"
+    page = STATIC / request.app[PAGE]
     if not page.is_file():
         raise web.HTTPNotFound(text="the page is missing from this installation of freelook\n")
     return web.Response(
@@ -123,12 +131,7 @@ async def _about(request: web.Request) -> web.StreamResponse:
 
 
 async def _control(request: web.Request) -> web.StreamResponse:
-    _expect_type(request, "application/json")
-    try:
-        data = json.loads(await _body(request))
-    except (ValueError, RecursionError) as error:
-        raise web.HTTPBadRequest(text=f"this is not JSON: {error}\n") from None
-    tracker, action = _strings(data, "tracker", "action")
+    tracker, action = await read_strings(request, "tracker", "action")
     try:
         request.app[STATION].control(tracker, action)
     except UnknownName as error:
@@ -137,11 +140,18 @@ async def _control(request: web.Request) -> web.StreamResponse:
     return web.Response(status=204)
 
 
-def _strings(data: object, *keys: str) -> list[str]:
+async def read_strings(request: web.Request, *keys: str) -> list[str]:
+    """The texts under these keys of a JSON object; the answer says what is wrong otherwise."""
+    _expect_type(request, "application/json")
+    try:
+        data = json.loads(await _body(request))
+    except (ValueError, RecursionError) as error:
+        raise web.HTTPBadRequest(text=f"this is not JSON: {error}\n") from None
     values = [data.get(key) if isinstance(data, dict) else None for key in keys]
     if not all(isinstance(value, str) for value in values):
+        texts = "texts" if len(keys) > 1 else "text"
         wanted = " and ".join(f'"{key}"' for key in keys)
-        raise web.HTTPBadRequest(text=f"expected a JSON object with the texts {wanted}\n")
+        raise web.HTTPBadRequest(text=f"expected a JSON object with the {texts} {wanted}\n")
     return [str(value) for value in values]
 
 

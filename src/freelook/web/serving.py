@@ -18,14 +18,12 @@ from aiohttp import web
 
 from ..errors import FreelookError
 from . import security
-from .server import make_app
-from .station import Station
 
 REPORT_S = 0.5
 SHUTDOWN_S = 2.0
 ANY_ADDRESS = ("0.0.0.0", "::", "")
 
-Report = Callable[[Station], None]
+Report = Callable[[], None]
 Ending = Callable[[], Coroutine[None, None, None]]
 
 
@@ -70,37 +68,35 @@ def open_door(
 
 
 async def serve(
-    station: Station,
+    app: web.Application,
     door: Door,
     *,
     ready: Callable[[], None],
     report: Report,
     until: Ending,
 ) -> None:
-    """Run the station until `until` is done, or this process is asked to stop.
+    """Run a station's application until `until` is done, or this process is asked to stop.
 
     `ready` is called once the page can be opened, `report` twice a second from then on.
     """
-    runner = web.AppRunner(
-        make_app(station, door.guard), access_log=None, shutdown_timeout=SHUTDOWN_S
-    )
+    runner = web.AppRunner(app, access_log=None, shutdown_timeout=SHUTDOWN_S)
     try:
         await runner.setup()
         await web.SockSite(runner, door.socket, ssl_context=door.tls).start()
         ready()
-        await _reporting(station, report, until)
+        await _reporting(report, until)
     finally:
         await runner.cleanup()
 
 
-async def _reporting(station: Station, report: Report, until: Ending) -> None:
+async def _reporting(report: Report, until: Ending) -> None:
     ending, asked = ends = (
         asyncio.ensure_future(until()),
         asyncio.ensure_future(_asked_to_stop()),
     )
     try:
         while not any(end.done() for end in ends):
-            report(station)
+            report()
             await asyncio.wait(ends, timeout=REPORT_S, return_when=asyncio.FIRST_COMPLETED)
     finally:
         for end in ends:
