@@ -67,7 +67,7 @@ class Document:
     def looks_like_xml(self) -> bool:
         return self._first == "<"
 
-    @property
+    @cached_property
     def _first(self) -> str:
         return self.text.lstrip("\ufeff \t\r\n")[:1]
 

@@ -137,8 +137,8 @@ def _camera(cam: dict[str, Any], name: str) -> Camera:
 
 def _notes(cam: dict[str, Any]) -> list[str]:
     notes = []
-    for key in ("T_cam_imu", "T_cn_cnm1"):
-        if key in cam:
+    for key in cam:
+        if key.startswith("T_"):  # T_cam_imu, T_cn_cnm1, and what other programs add
             notes.append(f"{key} (where the camera sits) is not used: {cam[key]!s:.300}")
     shift = cam.get("timeshift_cam_imu")
     if isinstance(shift, float) and shift:
