@@ -352,6 +352,14 @@ def test_old_names_tuples_and_optimisation_inputs_are_read() -> None:
     assert read(text(something=1, more=[2])).notes == ("not taken over: something, more",)
 
 
+def test_control_points_that_no_corner_was_near_are_zero() -> None:
+    """mrcal's solver leaves them at numbers such as these, which are nothing but rounding."""
+    knots = [3.733054474e-300, -5e-324, *KNOTS[2:]]
+    lens = read(text(SPLINED.format(3), knots)).camera.lens
+    assert isinstance(lens, SplinedStereographic)
+    assert lens.control == (0.0, 0.0, *KNOTS[2:])
+
+
 def test_regions_that_say_little() -> None:
     assert "is reliable nowhere" in read(text(valid_intrinsics_region=[])).notes[0]
     outside = [[-5000, -5000], [5000, -5000], [5000, 5000], [-5000, 5000], [-5000, -5000]]

@@ -158,8 +158,16 @@ def _intrinsics(data: dict[str, Any], name: str) -> tuple[list[float], list[floa
     for key in ("intrinsics", "imagersize"):
         if key not in data:
             raise ProfileError(f"key '{key}' is missing; needed: lensmodel, intrinsics, imagersize")
-    values = numbers(_list(data["intrinsics"]), len(CORE) + _count(name), f"intrinsics of {name}")
+    values = _list(data["intrinsics"])
+    if isinstance(values, list):
+        # control points that no corner was near are left at the likes of 3e-300 by its solver
+        values = [0.0 if _next_to_nothing(value) else value for value in values]
+    values = numbers(values, len(CORE) + _count(name), f"intrinsics of {name}")
     return values[: len(CORE)], values[len(CORE) :]
+
+
+def _next_to_nothing(value: Any) -> bool:
+    return isinstance(value, float) and abs(value) < 1e-30
 
 
 def _count(name: str) -> int:
