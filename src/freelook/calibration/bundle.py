@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,13 +23,18 @@ from scipy.spatial.transform import Rotation
 
 from ..camera import Camera
 from ..errors import CalibrationError
-from ..lens import Floats, image_point
-from .parameters import Freedom, Parameters, difference_step
+from ..lens import Floats
+from .parameters import Freedom, Parameters
+from .slopes import cross_matrices, point_slopes, project, value_slopes
 from .views import Pose, View
 
+Bools = NDArray[np.bool_]
+
 STEPS = 60
-ENOUGH = 1e-8  # relative gain of a step that is the last
+ENOUGH, ROUGHLY = 1e-8, 1e-3  # relative gain of a step that is the last
 REJECT = 4.5  # times the noise per coordinate: chance drops 4 in 100,000 good points
+FEWEST_COUNTED = 4  # points that a view needs for its pose to mean anything
+WORST_CONDITION = 1e14
 
 
 @dataclass(frozen=True)
@@ -48,7 +54,7 @@ class Solution:
     camera: Camera
     poses: tuple[Pose, ...]
     residuals: tuple[Floats, ...]
-    inliers: tuple[NDArray[np.bool_], ...]
+    inliers: tuple[Bools, ...]
     covariance: Floats
     names: tuple[str, ...]
     condition: float
@@ -63,8 +69,9 @@ class Solution:
 
 
 def rms(residuals: Floats) -> float:
-    """Root of the mean squared length of (n, 2) residuals."""
-    return float(np.sqrt(np.mean(np.sum(residuals**2, axis=-1))))
+    """Root of the mean squared length of (n, 2) residuals; NaN of none."""
+    squares = _squares(residuals)
+    return float(np.sqrt(squares.mean())) if len(squares) else float("nan")
 
 
 def solve(
@@ -74,89 +81,177 @@ def solve(
     freedom: Freedom | None = None,
     *,
     robust: bool = True,
+    counted: Sequence[Bools] | None = None,
     steps: int = STEPS,
 ) -> Solution:
     """Adjust everything, starting from a camera and poses that are about right.
 
-    `robust=False` counts every point fully. `steps` bounds each minimisation. CalibrationError when
-    the views do not determine the camera.
+    robust   False counts every point fully, or those that are true in `counted`, (n,) a view
+    steps    bounds each minimisation
+
+    A view with fewer than 4 points that count keeps its pose and counts for nothing.
+    CalibrationError when the views do not determine the camera.
     """
     problem = _Problem(views, camera, freedom or Freedom())
-    state = _State(problem.parameters.values, tuple(poses))
-    counted = np.ones(problem.count)
+    state = State.of(problem.parameters.values, poses)
     if robust:
-        state = _graduated(problem, state, steps)
-        counted = _inliers(problem, state)
-    state = _minimise(problem, state, lambda _: counted, steps)
-    if robust:  # the last step may have brought some back, or pushed some out
-        counted = _inliers(problem, state)
-        state = _minimise(problem, state, lambda _: counted, steps)
-    return _solution(problem, state, counted)
+        state, weights = _robustly(problem, state, steps)
+    else:
+        weights = _asked(problem, counted)
+        state = _minimise(problem, state, lambda _: weights, steps)
+    return _solution(problem, state, weights)
 
 
 def resect(camera: Camera, pose: Pose, view: View) -> tuple[Pose, Floats]:
     """The best pose of one view in a known camera, robustly, and its residuals (n, 2)."""
-    problem = _Problem([view], camera, Freedom(lens=False, center=False, aspect=False))
-    state = _graduated(problem, _State(np.zeros(0), (pose,)))
+    problem = _Problem([view], camera, KNOWN)
+    state = _graduated(problem, State.of(np.zeros(0), [pose]))
     return state.poses[0], problem.residuals(state)
 
 
+def resect_all(
+    camera: Camera,
+    poses: Sequence[Pose],
+    views: Sequence[View],
+    counted: Sequence[Bools] | None = None,
+) -> tuple[tuple[Pose, ...], tuple[Floats, ...]]:
+    """The best pose of each view in a known camera, by plain least squares from good ones on.
+
+    Only points that are true in `counted` count. With residuals (n, 2) of all points.
+    """
+    problem = _Problem(views, camera, KNOWN)
+    weights = _asked(problem, counted)
+    state = _minimise(problem, State.of(np.zeros(0), poses), lambda _: weights, STEPS)
+    residuals = problem.residuals(state)
+    return state.poses, tuple(residuals[part] for part in problem.parts)
+
+
+KNOWN = Freedom(lens=False, center=False, aspect=False)
+
+
 @dataclass(frozen=True)
-class _State:
+class State:
+    """Values (k,), and of every pose the rotation matrix (views, 3, 3) and shift (views, 3)."""
+
     values: Floats
-    poses: tuple[Pose, ...]
+    turns: Floats
+    shifts: Floats
+
+    @classmethod
+    def of(cls, values: Floats, poses: Sequence[Pose]) -> State:
+        turns = np.stack([pose.camera_from_target.as_matrix() for pose in poses])
+        return cls(values, turns, np.stack([pose.translation for pose in poses]))
+
+    @property
+    def poses(self) -> tuple[Pose, ...]:
+        rotations = Rotation.from_matrix(self.turns)
+        return tuple(Pose(rotations[i], shift) for i, shift in enumerate(self.shifts))
+
+    def moved(self, step: tuple[Floats, Floats]) -> State:
+        """By (values, (views, 6): rotation vector, shift)."""
+        values, moves = step
+        turns = Rotation.from_rotvec(moves[:, :3]).as_matrix() @ self.turns
+        return State(self.values + values, turns, self.shifts + moves[:, 3:])
+
+
+class Problem(Protocol):
+    """What is minimised: `count` points in `parts`, each of which has its own pose.
+
+    How values and poses become pixels is the problem's own affair: one camera, or two on a rig.
+    """
+
+    count: int
+    parts: list[slice]
+
+    def residuals(self, state: State) -> Floats:
+        """(count, 2): seen minus projected, pixels."""
+        ...
+
+    def slopes(self, state: State) -> tuple[Floats, Floats]:
+        """d pixel / d values (n, 2, k) and d pixel / d (rotation vector, shift) (n, 2, 6)."""
+        ...
 
 
 class _Problem:
     """The views stacked, and what a row of values means."""
 
     def __init__(self, views: Sequence[View], camera: Camera, freedom: Freedom) -> None:
-        self.views = views
         self.parameters = Parameters(camera, freedom)
+        self.points = np.concatenate([view.points for view in views])
         self.pixels = np.concatenate([view.pixels for view in views])
         self.count = len(self.pixels)
-        ends = np.cumsum([0, *(len(view.pixels) for view in views)])
-        self.parts = [slice(a, b) for a, b in pairwise(ends)]
+        lengths = [len(view.pixels) for view in views]
+        self.parts = [slice(a, b) for a, b in pairwise(np.cumsum([0, *lengths]))]
+        self.view_of = np.repeat(np.arange(len(views)), lengths)
 
-    def in_camera(self, poses: Sequence[Pose]) -> Floats:
-        seen = [pose.apply(v.points) for pose, v in zip(poses, self.views, strict=True)]
-        return np.concatenate(seen)
+    def turned(self, state: State) -> Floats:
+        """The points (n, 3) by the rotations alone."""
+        turned = state.turns[self.view_of] @ self.points[:, :, None]
+        return np.asarray(turned[:, :, 0])
 
-    def residuals(self, state: _State) -> Floats:
+    def residuals(self, state: State) -> Floats:
         camera = self.parameters.camera_of(state.values)
-        return self.pixels - project(camera, self.in_camera(state.poses))
+        return self.pixels - project(camera, self.turned(state) + state.shifts[self.view_of])
+
+    def slopes(self, state: State) -> tuple[Floats, Floats]:
+        """d pixel / d values (n, 2, k) and d pixel / d (rotation vector, shift) (n, 2, 6)."""
+        turned = self.turned(state)
+        points = turned + state.shifts[self.view_of]
+        by_camera = value_slopes(self.parameters, state.values, points)
+        by_shift = point_slopes(self.parameters.camera_of(state.values), points)
+        return by_camera, np.concatenate([-by_shift @ cross_matrices(turned), by_shift], axis=-1)
 
 
-def project(camera: Camera, points: Floats) -> Floats:
-    """As `Camera.project`, but never NaN: beyond the formula's end a point stays at its end.
+def _asked(problem: Problem, counted: Sequence[Bools] | None) -> Floats:
+    if counted is None:
+        return _enough(problem, np.ones(problem.count))
+    return _enough(problem, np.concatenate(counted).astype(np.float64))
 
-    What lies out there is wrong anyway; a solver has to find its way back from it.
-    """
-    across = np.hypot(points[:, 0], points[:, 1])
-    theta = np.arctan2(across, points[:, 2])
-    theta = np.minimum(theta, camera.lens.hard_limit * (1 - 1e-6))
-    at = image_point(camera.lens, theta, np.arctan2(points[:, 1], points[:, 0]))
-    return np.asarray(camera.center) + at @ camera.stretch.T
+
+def _enough(problem: Problem, weights: Floats) -> Floats:
+    """Weights without those of views that have too few points left for a pose."""
+    weights = weights.copy()
+    for part in problem.parts:
+        if (weights[part] > 0).sum() < FEWEST_COUNTED:
+            weights[part] = 0
+    return weights
 
 
 _Weights = Callable[[Floats], Floats]
 
 
-def _graduated(problem: _Problem, state: _State, steps: int = STEPS) -> _State:
+def _graduated(problem: Problem, state: State, steps: int = STEPS) -> State:
     """Robust steps: the scale follows the residuals down to their noise."""
-    for _ in range(6):
-        scale = 3 * max(_noise(problem.residuals(state)), 1e-6)
-        before = scale
-        state = _minimise(problem, state, _geman_mcclure(scale), steps)
-        if _noise(problem.residuals(state)) * 3 > 0.95 * before:
+    scale = 3 * max(_noise(problem.residuals(state)), 1e-6)
+    for _ in range(8):
+        state = _minimise(problem, state, _geman_mcclure(scale), steps, ROUGHLY)
+        before, scale = scale, 3 * max(_noise(problem.residuals(state)), 1e-6)
+        if scale > 0.9 * before:
             break
     return state
 
 
-def _inliers(problem: _Problem, state: _State) -> Floats:
+def _robustly(problem: Problem, state: State, steps: int = STEPS) -> tuple[State, Floats]:
+    return _cleaned(problem, _graduated(problem, state, steps), steps)
+
+
+def _cleaned(problem: Problem, state: State, steps: int) -> tuple[State, Floats]:
+    """Plain least squares without the points that are too far off, until these stay the same."""
+    weights = np.ones(problem.count)
+    for _ in range(6):
+        before, weights = weights, _inliers(problem, state, weights)
+        if np.array_equal(weights, before):
+            break
+        fixed = weights
+        state = _minimise(problem, state, lambda _, fixed=fixed: fixed, steps)  # type: ignore[misc]
+    return state, weights
+
+
+def _inliers(problem: Problem, state: State, counted: Floats) -> Floats:
+    """1 for points within `REJECT` times the noise of those that counted before, 0 for others."""
     residuals = problem.residuals(state)
-    limit = REJECT * max(_noise(residuals), 1e-6)
-    return (np.sqrt(_squares(residuals)) <= limit).astype(float)
+    limit = REJECT * max(_noise(residuals[counted > 0]), 1e-6)
+    return _enough(problem, (np.sqrt(_squares(residuals)) <= limit).astype(float))
 
 
 def _noise(residuals: Floats) -> float:
@@ -172,7 +267,9 @@ def _geman_mcclure(scale: float) -> _Weights:
     return lambda residuals: np.asarray((1 + _squares(residuals) / scale**2) ** -2)
 
 
-def _minimise(problem: _Problem, state: _State, weights_of: _Weights, steps: int = STEPS) -> _State:
+def _minimise(
+    problem: Problem, state: State, weights_of: _Weights, steps: int, enough: float = ENOUGH
+) -> State:
     """Levenberg-Marquardt with weights that follow the residuals."""
     damping = 1e-3
     residuals = problem.residuals(state)
@@ -181,42 +278,31 @@ def _minimise(problem: _Problem, state: _State, weights_of: _Weights, steps: int
         cost = float(weights @ _squares(residuals))
         equations = _Equations.of(problem, state, residuals, weights)
         while True:
-            step = equations.step(damping)
-            moved = _moved(state, step, len(problem.parts)) if step is not None else None
-            if moved is not None:
-                new = _tried(problem, moved)
-                if new is not None and float(weights @ _squares(new)) < cost:
-                    break
+            moved, new = _tried(problem, state, equations.step(damping))
+            if new is not None and (new_cost := float(weights @ _squares(new))) < cost:
+                break
             damping *= 8
             if damping > 1e10:
                 return state
-        gain = 1 - float(weights @ _squares(new)) / cost
         state, residuals, damping = moved, new, max(damping / 6, 1e-12)
-        if gain < ENOUGH:
+        if cost - new_cost < enough * cost:
             return state
     return state
 
 
-def _tried(problem: _Problem, state: _State) -> Floats | None:
-    """The residuals at a new state; None where the lens is no lens any more."""
+def _tried(
+    problem: Problem, state: State, step: tuple[Floats, Floats] | None
+) -> tuple[State, Floats | None]:
+    """The state after a step and its residuals; None where the lens is no lens any more."""
+    if step is None:
+        return state, None
     try:
         with np.errstate(all="raise", under="ignore"):
-            residuals = problem.residuals(state)
-    except FloatingPointError:
-        return None
-    return residuals if np.isfinite(residuals).all() else None
-
-
-def _moved(state: _State, step: tuple[Floats, Floats], count: int) -> _State:
-    values, turns = step
-    poses = tuple(
-        Pose(
-            Rotation.from_rotvec(turns[i, :3]) * state.poses[i].camera_from_target,
-            state.poses[i].translation + turns[i, 3:],
-        )
-        for i in range(count)
-    )
-    return _State(state.values + values, poses)
+            moved = state.moved(step)
+            residuals = problem.residuals(moved)
+    except (FloatingPointError, ValueError):
+        return state, None
+    return moved, residuals if np.isfinite(residuals).all() else None
 
 
 @dataclass(frozen=True)
@@ -230,19 +316,23 @@ class _Equations:
     poses_right: Floats  # (views, 6)
 
     @classmethod
-    def of(cls, problem: _Problem, state: _State, residuals: Floats, weights: Floats) -> _Equations:
-        by_camera, by_pose = slopes(problem, state)
-        weighted = by_camera * weights[:, None, None]
-        camera = np.einsum("nik,nil->kl", weighted, by_camera)
-        right = np.einsum("nik,ni->k", weighted, residuals)
-        between, poses, poses_right = [], [], []
-        for part in problem.parts:
-            own = by_pose[part]
-            heavy = own * weights[part][:, None, None]
-            between.append(np.einsum("nik,nil->kl", by_camera[part], heavy))
-            poses.append(np.einsum("nik,nil->kl", heavy, own))
-            poses_right.append(np.einsum("nik,ni->k", heavy, residuals[part]))
-        return cls(camera, np.array(between), np.array(poses), right, np.array(poses_right))
+    def of(cls, problem: Problem, state: State, residuals: Floats, weights: Floats) -> _Equations:
+        """`weights` (n,); the poses of views that count for nothing stay where they are."""
+        by_camera, by_pose = problem.slopes(state)
+        k = by_camera.shape[-1]
+        root = np.sqrt(weights)
+        rows = np.concatenate([by_camera, by_pose, residuals[:, :, None]], axis=-1)
+        rows = (rows * root[:, None, None]).reshape(2 * problem.count, k + 7)
+        products = np.stack([_square(rows[2 * p.start : 2 * p.stop]) for p in problem.parts])
+        poses = products[:, k:-1, k:-1]
+        poses[~poses.any(axis=(1, 2))] = np.eye(6)
+        return cls(
+            products[:, :k, :k].sum(0),
+            products[:, :k, k:-1],
+            poses,
+            products[:, :k, -1].sum(0),
+            products[:, k:-1, -1],
+        )
 
     def step(self, damping: float) -> tuple[Floats, Floats] | None:
         """(camera values, pose changes (views, 6)), or None where the equations say nothing."""
@@ -250,19 +340,23 @@ class _Equations:
         camera = self.camera + _diagonal(self.camera, damping)
         try:
             inverse = np.linalg.inv(poses)
-            through = np.einsum("vkp,vpq->vkq", self.between, inverse)
-            left = camera - np.einsum("vkq,vlq->kl", through, self.between)
-            right = self.camera_right - np.einsum("vkq,vq->k", through, self.poses_right)
+            through = self.between @ inverse
+            left = camera - (through @ self.between.swapaxes(1, 2)).sum(0)
+            right = self.camera_right - (through @ self.poses_right[:, :, None]).sum(0)[:, 0]
             values = _scaled_solve(left, right)
         except (np.linalg.LinAlgError, FloatingPointError):
             return None
-        back = self.poses_right - np.einsum("vkp,k->vp", self.between, values)
-        return values, np.einsum("vpq,vq->vp", inverse, back)
+        back = self.poses_right - values @ self.between
+        return values, (inverse @ back[:, :, None])[:, :, 0]
 
     def information(self) -> Floats:
         """(k, k) of the camera alone, the poses eliminated."""
-        through = np.einsum("vkp,vpq->vkq", self.between, np.linalg.inv(self.poses))
-        return np.asarray(self.camera - np.einsum("vkq,vlq->kl", through, self.between))
+        through = self.between @ np.linalg.inv(self.poses)
+        return np.asarray(self.camera - (through @ self.between.swapaxes(1, 2)).sum(0))
+
+
+def _square(rows: Floats) -> Floats:
+    return np.asarray(rows.T @ rows)
 
 
 def _diagonal(blocks: Floats, damping: float) -> Floats:
@@ -279,73 +373,61 @@ def _scaled_solve(left: Floats, right: Floats) -> Floats:
     return np.asarray(scale * np.linalg.solve(left * np.outer(scale, scale), right * scale))
 
 
-def slopes(problem: _Problem, state: _State) -> tuple[Floats, Floats]:
-    """d pixel / d values (n, 2, k) and d pixel / d (rotation vector, translation) (n, 2, 6)."""
-    camera, points = problem.parameters.camera_of(state.values), problem.in_camera(state.poses)
-    by_camera = value_slopes(problem.parameters, state.values, points)
-    by_point = point_slopes(camera, points)
-    by_pose = np.empty((problem.count, 2, 6))
-    for part, pose in zip(problem.parts, state.poses, strict=True):
-        turned = points[part] - pose.translation
-        by_pose[part, :, :3] = -np.einsum("nij,njk->nik", by_point[part], cross_matrices(turned))
-    by_pose[:, :, 3:] = by_point
-    return by_camera, by_pose
+@dataclass(frozen=True)
+class Adjusted:
+    """A problem solved: see `Solution`. `residuals` (n, 2), `counted` (n,), of all points."""
+
+    state: State
+    residuals: Floats
+    counted: Bools
+    covariance: Floats
+    condition: float
+    noise_px: float
 
 
-def value_slopes(parameters: Parameters, values: Floats, points: Floats) -> Floats:
-    """d pixel / d values (n, 2, k) of points in the camera frame, by central differences."""
-    columns = np.empty((len(points), 2, len(values)))
-    for i, value in enumerate(values):
-        step = np.zeros(len(values))
-        step[i] = difference_step(value)
-        ahead = project(parameters.camera_of(values + step), points)
-        behind = project(parameters.camera_of(values - step), points)
-        columns[:, :, i] = (ahead - behind) / (2 * step[i])
-    return columns
+def adjusted(problem: Problem, state: State) -> Adjusted:
+    """The state adjusted robustly, and what is known about it. CalibrationError as in `solve`."""
+    return _known(problem, *_robustly(problem, state))
 
 
-def point_slopes(camera: Camera, points: Floats) -> Floats:
-    """d pixel / d point in the camera frame, (n, 2, 3), by central differences."""
-    h = 1e-6 * np.linalg.norm(points, axis=1, keepdims=True)
-    columns = [
-        (project(camera, points + h * axis) - project(camera, points - h * axis)) / (2 * h)
-        for axis in np.eye(3)
-    ]
-    return np.stack(columns, axis=-1)
-
-
-def cross_matrices(v: Floats) -> Floats:
-    """[v]x for many v: [v]x @ w = v x w."""
-    zero = np.zeros(len(v))
-    x, y, z = v.T
-    return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(-1, 3, 3)
-
-
-def _solution(problem: _Problem, state: _State, counted: Floats) -> Solution:
+def _known(problem: Problem, state: State, counted: Floats) -> Adjusted:
     residuals = problem.residuals(state)
-    information = _Equations.of(problem, state, residuals, counted).information()
+    try:
+        information = _Equations.of(problem, state, residuals, counted).information()
+    except np.linalg.LinAlgError:
+        raise CalibrationError(UNDETERMINED) from None
     scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
     unit = information * np.outer(scale, scale)
     condition = float(np.linalg.cond(unit)) if len(unit) else 1.0
-    if not np.isfinite(condition) or condition > 1e14:
-        raise CalibrationError(
-            "these views do not determine the camera; add views with the target tilted, near the "
-            "rim and at other distances"
-        )
-    unknowns = len(state.values) + 6 * len(problem.parts)
+    if not condition < WORST_CONDITION:
+        raise CalibrationError(UNDETERMINED)
+    used = sum(bool(counted[part].any()) for part in problem.parts)
+    unknowns = len(state.values) + 6 * used
     surplus = 2 * int(counted.sum()) - unknowns
     if surplus < 1:
         raise CalibrationError(
             f"{int(counted.sum())} points are too few for {unknowns} unknowns; add views"
         )
     variance = float(counted @ _squares(residuals)) / surplus
+    covariance = variance * np.linalg.inv(unit) * np.outer(scale, scale)
+    return Adjusted(state, residuals, counted > 0, covariance, condition, float(np.sqrt(variance)))
+
+
+def _solution(problem: _Problem, state: State, weights: Floats) -> Solution:
+    known = _known(problem, state, weights)
     return Solution(
         problem.parameters.camera_of(state.values),
         state.poses,
-        tuple(residuals[part] for part in problem.parts),
-        tuple(counted[part] > 0 for part in problem.parts),
-        variance * np.linalg.inv(unit) * np.outer(scale, scale),
+        tuple(known.residuals[part] for part in problem.parts),
+        tuple(known.counted[part] for part in problem.parts),
+        known.covariance,
         problem.parameters.names,
-        condition,
-        float(np.sqrt(variance)),
+        known.condition,
+        known.noise_px,
     )
+
+
+UNDETERMINED = (
+    "these views do not determine the camera; add views with the target tilted, near the rim and "
+    "at other distances"
+)

@@ -123,7 +123,7 @@ def calibrate(
     assert solution is not None
     seen = seen_angle(solution, used)
     return Calibration(
-        _with_field(solution.camera, seen),
+        with_field(solution.camera, seen),
         best.model,
         solution,
         tuple(used),
@@ -323,7 +323,7 @@ def _best(candidates: Sequence[Candidate]) -> Candidate:
     return next(c for c in able if score(c) * WORTH_IT <= least)
 
 
-def _with_field(camera: Camera, seen: float) -> Camera:
+def with_field(camera: Camera, seen: float) -> Camera:
     """The camera with the field it is good for."""
     half = min(seen + MARGIN, growth_limit(camera.lens))
     try:

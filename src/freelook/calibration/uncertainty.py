@@ -15,8 +15,9 @@ import numpy as np
 
 from ..camera import Camera
 from ..lens import Floats
-from .bundle import Solution, cross_matrices, point_slopes, value_slopes
+from .bundle import Solution
 from .parameters import Freedom, Parameters
+from .slopes import cross_matrices, point_slopes, value_slopes
 
 COLUMNS = 24  # of the pixels that decide the turn
 

@@ -1,0 +1,124 @@
+"""Where points land, and how that changes with the point and with what is solved for.
+
+Round lenses need nothing but r(theta): its slope and what each parameter does to it are central
+differences of one curve, the rest is geometry. Lenses that are not round are differenced whole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..camera import Camera
+from ..lens import BentLens, Floats, Lens, image_point, radius_slope, vector, with_vector
+from .parameters import Parameters, difference_step
+
+INSIDE = 1 - 1e-6  # of the angle where a formula ends
+
+
+def project(camera: Camera, points: Floats) -> Floats:
+    """Pixels (n, 2) as `Camera.project`, but never NaN: beyond the formula's end a point stays
+    at its end.
+
+    What lies out there is wrong anyway; a solver has to find its way back from it.
+    """
+    polar = _Polar.of(points)
+    at = _lands(camera.lens, isinstance(camera.lens, BentLens), polar)
+    return np.asarray(camera.center) + at @ camera.stretch.T
+
+
+def value_slopes(parameters: Parameters, values: Floats, points: Floats) -> Floats:
+    """d pixel / d values (n, 2, k) of points (n, 3) in the camera frame."""
+    camera, free = parameters.camera_of(values), parameters.freedom
+    bent, polar = isinstance(camera.lens, BentLens), _Polar.of(points)
+    columns: list[Floats] = []
+    if free.lens:
+        columns += [s @ camera.stretch.T for s in _lens_slopes(camera.lens, bent, polar)]
+    if free.center:
+        columns += [np.broadcast_to(axis, (len(points), 2)) for axis in np.eye(2)]
+    if free.aspect or free.skew:
+        down, nothing = _lands(camera.lens, bent, polar)[:, 1], np.zeros(len(points))
+        columns += [np.stack([nothing, down], axis=-1)] if free.aspect else []
+        columns += [np.stack([down, nothing], axis=-1)] if free.skew else []
+    return np.stack(columns, axis=-1) if columns else np.zeros((len(points), 2, 0))
+
+
+def point_slopes(camera: Camera, points: Floats) -> Floats:
+    """d pixel / d point (n, 2, 3) of points (n, 3) in the camera frame."""
+    if isinstance(camera.lens, BentLens):
+        return _differences(lambda p: project(camera, p), points)
+    return np.asarray(camera.stretch @ _round_slopes(camera.lens, _Polar.of(points)))
+
+
+def cross_matrices(v: Floats) -> Floats:
+    """[v]x for many v (n, 3): [v]x @ w = v x w."""
+    zero = np.zeros(len(v))
+    x, y, z = v.T
+    return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(-1, 3, 3)
+
+
+@dataclass(frozen=True)
+class _Polar:
+    """Points by angle from the axis, direction around it (unit vector, 0 on the axis itself)."""
+
+    across: Floats
+    along: Floats
+    theta: Floats
+    outwards: Floats  # (n, 2)
+
+    @classmethod
+    def of(cls, points: Floats) -> _Polar:
+        across, along = np.hypot(points[:, 0], points[:, 1]), points[:, 2]
+        outwards = np.zeros((len(points), 2))
+        np.divide(points[:, :2], across[:, None], out=outwards, where=across[:, None] > 0)
+        return cls(across, along, np.arctan2(across, along), outwards)
+
+
+def _lands(lens: Lens, bent: bool, polar: _Polar) -> Floats:
+    """(n, 2) pixels from the axis, before the stretch."""
+    theta = np.minimum(polar.theta, lens.hard_limit * INSIDE)
+    if bent:
+        return image_point(lens, theta, np.arctan2(polar.outwards[:, 1], polar.outwards[:, 0]))
+    return np.asarray(lens.radius(theta)[:, None] * polar.outwards)
+
+
+def _lens_slopes(lens: Lens, bent: bool, polar: _Polar) -> list[Floats]:
+    """d (landing place) / d (parameter) (n, 2), for each parameter of the lens."""
+    values, slopes = vector(lens), []
+    for i, value in enumerate(values):
+        step = np.zeros(len(values))
+        step[i] = difference_step(value)
+        ahead, behind = with_vector(lens, values + step), with_vector(lens, values - step)
+        change = _lands(ahead, bent, polar) - _lands(behind, bent, polar)
+        slopes.append(change / (2 * step[i]))
+    return slopes
+
+
+def _round_slopes(lens: Lens, polar: _Polar) -> Floats:
+    """d (landing place) / d point (n, 2, 3) of a round lens."""
+    end = lens.hard_limit * INSIDE
+    theta = np.minimum(polar.theta, end)
+    radius, slope = lens.radius(theta), radius_slope(lens, theta)
+    # on the axis r / across is r'(0) / z
+    near = slope / np.maximum(np.abs(polar.along), 1e-300)
+    around = np.divide(radius, polar.across, out=near, where=polar.across > 1e-9 * polar.along)
+    slope = np.where(polar.theta < end, slope, 0.0)
+    squared = polar.across**2 + polar.along**2
+    by_across, by_along = slope * polar.along / squared, -slope * polar.across / squared
+    u = polar.outwards
+    slopes = np.empty((len(radius), 2, 3))
+    slopes[:, :, :2] = (by_across - around)[:, None, None] * (u[:, :, None] * u[:, None, :])
+    slopes[:, 0, 0] += around
+    slopes[:, 1, 1] += around
+    slopes[:, :, 2] = by_along[:, None] * u
+    return slopes
+
+
+def _differences(function: Callable[[Floats], Floats], points: Floats) -> Floats:
+    h = 1e-6 * np.linalg.norm(points, axis=1, keepdims=True)
+    columns = [
+        (function(points + h * axis) - function(points - h * axis)) / (2 * h) for axis in np.eye(3)
+    ]
+    return np.stack(columns, axis=-1)
