@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from ..lens import BentLens, Floats, Lens, vector
 from ._minimum import CLOSE, Minimum, minimise
-from ._models import CELLS, LEAST_SLOPE, Bools, free_names, lens_with, radius_of, slope_shortfall
+from ._models import Bools, free_names, lens_with, no_slack, radius_of, slope_slack
 
 # Which entries of the stretch are sought; xx stays as it is, for the lens has its own scale.
 STRETCHES: dict[str, tuple[tuple[int, int], ...]] = {
@@ -118,17 +118,21 @@ class CameraProblem:
         *,
         loss: str,
         scale: float | None = None,
-        least_slope: float = LEAST_SLOPE,
+        least_slope: float | None = None,
         effort: tuple[float, int] = CLOSE,
     ) -> Minimum:
-        """The minimum from a start on, held to lenses that grow to theta_max (radians)."""
+        """The minimum from a start on.
+
+        With a least slope, as a share of the mean, among lenses that grow so to theta_max
+        (radians).
+        """
 
         def rows(x: Floats) -> tuple[Floats, Floats]:
             lens = self.lens(x)
             if lens is None:
-                return np.full(self.pixel.size, np.nan), np.zeros(CELLS)
-            shortfall = 100 * self.size_px * slope_shortfall(lens, theta_max, least_slope)
-            return (self.pixel - self._through(lens, x)).ravel(), shortfall
+                return np.full(self.pixel.size, np.nan), no_slack(least_slope)
+            slack = slope_slack(lens, theta_max, least_slope)
+            return (self.pixel - self._through(lens, x)).ravel(), slack
 
         return minimise(rows, start, size=self.size_px, loss=loss, scale=scale, effort=effort)
 

@@ -11,15 +11,14 @@ from ..errors import FitError
 from ..lens import Floats, Lens, vector
 from ._minimum import CLOSE, Minimum, minimise
 from ._models import (
-    CELLS,
-    LEAST_SLOPE,
     Bools,
     free_names,
     lens_with,
     let_free,
+    no_slack,
     radius_of,
     round_parameters,
-    slope_shortfall,
+    slope_slack,
 )
 from ._scores import log_likelihood
 
@@ -149,19 +148,24 @@ class CurveProblem:
         theta_max: float,
         *,
         scale: float | None = None,
-        least_slope: float = LEAST_SLOPE,
+        least_slope: float | None = None,
         effort: tuple[float, int] = CLOSE,
     ) -> Minimum:
-        """The minimum from a start on, held to lenses that grow to theta_max."""
+        """The minimum from a start on.
+
+        With a least slope, as a share of the mean, among lenses that grow so to theta_max.
+        """
         data = self.data
         size = data.size_px / float(np.median(data.sigma_px))
 
         def rows(x: Floats) -> tuple[Floats, Floats]:
             lens = self.lens(x)
             if lens is None:
-                return np.full(len(data.theta), np.nan), np.zeros(CELLS)
+                return np.full(len(data.theta), np.nan), no_slack(least_slope)
             curve = self._through(lens, self.offset_px(x), data.theta)
-            shortfall = 100 * size * slope_shortfall(lens, theta_max, least_slope)
-            return (data.position_px - curve) / data.sigma_px, shortfall
+            return (
+                (data.position_px - curve) / data.sigma_px,
+                slope_slack(lens, theta_max, least_slope),
+            )
 
         return minimise(rows, start, size=size, loss=data.loss, scale=scale, effort=effort)

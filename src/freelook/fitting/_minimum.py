@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, minimize
 
 from ..errors import FitError
 from ..lens import Floats
 
-# Parameters (p,) to the residuals (n,) of the data, and to values (m,) that should be 0.
+# Parameters (p,) to the residuals (n,) of the data, and to values (m,) that must not be negative.
 Rows = Callable[[Floats], tuple[Floats, Floats]]
 
 # Residuals of this many standard deviations are where a robust loss begins to differ from least
@@ -21,6 +21,7 @@ TURN = 1.5
 # Where to stop, relatively, and after how many steps at the latest: to tell the deepest of several
 # valleys, to see what leaving points out does, to have the answer.
 ROUGH, FAIR, CLOSE = (1e-4, 20), (1e-7, 40), (1e-11, 100)
+STIFF = 30.0  # a constraint missed by 0.01 costs as much as one residual of a third of the data
 LOSSES = ("linear", "soft_l1", "cauchy")
 
 
@@ -34,7 +35,7 @@ class Minimum:
     step      (p,) changes of the parameters small enough for such differences
     loss      a name of `LOSSES`
     scale     the residual where the loss turns from square to robust
-    forced    whether the constraints pushed against the data
+    forced    whether it is held to something that the data alone would not want
     """
 
     x: Floats
@@ -43,7 +44,7 @@ class Minimum:
     step: Floats
     loss: str
     scale: float
-    forced: bool
+    forced: bool = False
 
     @property
     def rank(self) -> int:
@@ -97,7 +98,7 @@ def minimise(
 ) -> Minimum:
     """The parameters that make the residuals smallest, from `start` on.
 
-    rows    residuals, NaN where parameters make no sense; and constraints, always as plain squares
+    rows    residuals, NaN where parameters make no sense; and constraints of the order of 1
     size    how large the fitted quantity is, in the residuals' unit: steps and the smallest noise
             believed (1e-9 of it) follow from it
     loss    "linear" for least squares, "soft_l1" or "cauchy" against outliers
@@ -112,14 +113,15 @@ def minimise(
     problem = _Problem(rows, np.asarray(start, dtype=float), size)
     if loss == "linear":
         x = problem.solve(problem.start, loss, 1.0, effort)
-        return problem.minimum(problem.polished(x) if effort == CLOSE else x, loss, 1.0)
+        return problem.minimum(problem.finished(x, loss, 1.0, effort), loss, 1.0)
     x, turn = problem.start, scale or problem.turn(problem.start)
     for _ in range(0 if scale else 2 if effort == ROUGH else 12):
         x = problem.solve(x, loss, turn, ROUGH)
         last, turn = turn, problem.turn(x)
         if abs(turn - last) <= 0.02 * last:
             break
-    return problem.minimum(problem.solve(x, loss, turn, effort), loss, turn)
+    x = problem.solve(x, loss, turn, effort)
+    return problem.minimum(problem.finished(x, loss, turn, effort), loss, turn)
 
 
 def spread(values: Floats, parameters: int = 0) -> float:
@@ -149,6 +151,7 @@ class _Problem:
         self._parts = rows
         self.start, self._size = start, size
         self._count = len(self.values(start))
+        self._bounds = len(rows(start)[1])
         if not np.isfinite(self.values(start)).all():
             raise FitError(f"the start {start.tolist()} of the fit makes no sense")
         self._unit = np.array([self._step(j) for j in range(len(start))])
@@ -182,9 +185,52 @@ class _Problem:
             )
         return np.asarray(x + found.x * self._unit)
 
-    def polished(self, x: Floats) -> Floats:
-        """A few whole Gauss-Newton steps: they go along the long flat valleys of models whose
-        parameters nearly say the same, where trust regions creep."""
+    def finished(self, x: Floats, loss: str, turn: float, effort: tuple[float, int]) -> Floats:
+        """The last digits, along the long flat valleys and edges where trust regions creep."""
+        if self._bounds and effort != ROUGH:
+            return self._along_bounds(x, loss, turn)
+        return self._whole_steps(x) if loss == "linear" and effort == CLOSE else x
+
+    def _along_bounds(self, x: Floats, loss: str, turn: float) -> Floats:
+        """Sequential quadratic programming (SciPy's SLSQP), which goes along its constraints.
+
+        In directions in which the data are alike sensitive: it has no scaling of its own.
+        """
+        count = self._count
+        _, size, axes = np.linalg.svd(self._jacobian(x)[:count] / turn / np.sqrt(count))
+        size = np.maximum(size, 1e-9 * size[0])
+        directions = self._unit[:, None] * axes.T / size
+
+        def rows(w: Floats) -> Floats:
+            return self._rows(x + directions @ w)[:count] / turn
+
+        def cost(w: Floats) -> float:
+            return float(np.mean(_loss(loss, rows(w) ** 2)[0]))
+
+        def slope(w: Floats) -> Floats:
+            values = rows(w)
+            slopes = self._jacobian(x + directions @ w)[:count] / turn @ (axes.T / size)
+            return np.asarray(2 * slopes.T @ (values * _loss(loss, values**2)[1]) / count)
+
+        def slack(w: Floats) -> Floats:
+            with np.errstate(all="ignore"):
+                return np.nan_to_num(self._parts(x + directions @ w)[1], nan=-1.0)
+
+        with np.errstate(all="ignore"):
+            found = minimize(
+                cost,
+                np.zeros_like(x),
+                jac=slope,
+                method="SLSQP",
+                constraints={"type": "ineq", "fun": slack},
+                options={"maxiter": 300, "ftol": 1e-10 * max(cost(0 * x), 1e-12)},
+            )
+        better = cost(found.x) < cost(0 * x) or slack(0 * x).min() < -1e-6
+        feasible = bool(slack(found.x).min() > -1e-6)
+        return np.asarray(x + directions @ found.x) if better and feasible else x
+
+    def _whole_steps(self, x: Floats) -> Floats:
+        """A few whole Gauss-Newton steps, for models whose parameters nearly say the same."""
         rows = self._rows(x)
         for _ in range(20):
             step = np.linalg.lstsq(self._jacobian(x), -rows, rcond=1e-14)[0]
@@ -202,9 +248,7 @@ class _Problem:
 
     def minimum(self, x: Floats, loss: str, turn: float) -> Minimum:
         jacobian = self._jacobian(x)[: self._count] / self._unit
-        held = self._rows(x)[self._count :]
-        forced = bool((np.abs(held) > 1e-9 * self._size).any())
-        return Minimum(x, self.values(x), jacobian, self._unit, loss, turn, forced)
+        return Minimum(x, self.values(x), jacobian, self._unit, loss, turn)
 
     def _rows(self, x: Floats) -> Floats:
         """Data, then constraints; something large where the parameters make no sense."""
@@ -214,7 +258,8 @@ class _Problem:
 
     def _raw(self, x: Floats) -> Floats:
         with np.errstate(all="ignore"):
-            return np.concatenate(self._parts(x))
+            values, slack = self._parts(x)
+            return np.concatenate([values, STIFF * self._size * np.minimum(slack, 0)])
 
     def _jacobian(self, x: Floats) -> Floats:
         """d rows / d y, by central differences; one-sided where one side makes no sense."""

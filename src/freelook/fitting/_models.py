@@ -11,9 +11,7 @@ from numpy.typing import NDArray
 from ..errors import FitError, ProfileError
 from ..lens import MODELS, Floats, Lens, OCamCalib, RadialSpline, growth_limit, vector, with_vector
 
-# The slope that a fitted radius keeps at least, as a share of its mean slope.
-LEAST_SLOPE = 1e-3
-CELLS = 90
+PLACES = 91
 FINE_KNOTS = 32
 RECTILINEAR = ("perspective", "poly3", "poly5", "ptlens", "opencv_rational")
 
@@ -75,14 +73,24 @@ def lens_with(lens: Lens, x: Floats) -> Lens | None:
         return None
 
 
-def slope_shortfall(lens: Lens, theta_max: float, least: float = LEAST_SLOPE) -> Floats:
-    """How much slower than `least` (of its mean) the radius grows, in each of 90 cells; 0 is good.
+def slope_slack(lens: Lens, theta_max: float, least: float | None) -> Floats:
+    """How much faster than `least` the radius grows, in shares of the mean slope, at 91 angles.
 
-    In shares of the mean slope.
+    From 0 to theta_max (radians); nothing, (0,), without a bound.
     """
-    radius = radius_of(lens, np.linspace(0, theta_max, CELLS + 1))
-    mean = abs(radius[-1]) + 1e-9 * np.abs(radius).max() + 1e-300
-    return np.asarray(np.maximum(0.0, least - np.diff(radius) / mean * CELLS))
+    if least is None:
+        return no_slack(least)
+    theta = np.linspace(0, theta_max, PLACES)
+    low, high = np.maximum(theta - 1e-4, 0), np.minimum(theta + 1e-4, theta_max)
+    ends = radius_of(lens, np.concatenate([low, high, theta[-1:]]))
+    slope = (ends[PLACES:-1] - ends[:PLACES]) / (high - low)
+    mean = (abs(ends[-1]) + 1e-9 * np.abs(ends).max() + 1e-300) / theta_max
+    return np.asarray(slope / mean - least)
+
+
+def no_slack(least: float | None) -> Floats:
+    """As many zeros as `slope_slack` has values."""
+    return np.zeros(0 if least is None else PLACES)
 
 
 def model_end(model: str) -> float:

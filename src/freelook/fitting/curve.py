@@ -12,8 +12,9 @@ import numpy as np
 from ..errors import FitError
 from ..lens import MODELS, Floats, Lens, vector
 from ._curve_data import CurveData, CurveProblem, checked
+from ._grown import HELD_SLOPES, grown
 from ._minimum import FAIR, ROUGH, Minimum, spread
-from ._models import LEAST_SLOPE, check_end, check_growth, grows, known_model, radius_of
+from ._models import check_end, check_growth, known_model, radius_of
 from ._scores import Scored
 from ._starts import starting_curves
 
@@ -98,7 +99,11 @@ class CurveFit(Scored):
             out[order[group::groups]] = True
             seen = replace(self._problem, data=data.part(~out))
             found = seen.fit(
-                self._minimum.x, self.theta_max, scale=self._minimum.scale, effort=FAIR
+                self._minimum.x,
+                self.theta_max,
+                scale=self._minimum.scale,
+                least_slope=HELD_SLOPES[-2] if self.forced else None,
+                effort=FAIR,
             )
             residuals[out] = replace(seen, data=data.part(out)).residuals_px(found.x)
         return residuals
@@ -152,7 +157,10 @@ def fit_curve(
     data = checked(theta, radius_px, sigma_px, free_offset, loss)
     check_end(model, data.theta_max)
     problem, found = best_curve(model, data)
-    lens, found = _growing(model, problem, found)
+    lens = problem.lens(found.x)
+    if lens is None:
+        raise FitError(f"{model} does not fit these points: no lens comes near them")
+    check_growth(lens, data.theta_max, model)
     return CurveFit(
         model=model,
         lens=lens,
@@ -168,7 +176,7 @@ def fit_curve(
 def best_curve(
     model: str, data: CurveData, *, fine: bool = False, held: Sequence[str] = ()
 ) -> tuple[CurveProblem, Minimum]:
-    """The deepest minimum found; whether its lens grows all the way is not yet looked at.
+    """The deepest minimum found, held to growing lenses if need be and if that helps.
 
     fine  as many knots or terms as help where there is no noise
     held  parameters that stay at their defaults
@@ -181,12 +189,19 @@ def best_curve(
     if n <= p:
         raise FitError(f"{model} has {p} parameters here; it needs {p + 1} points, not {n}")
     starts += _simpler(*starts[0])
-    ends = [
-        (problem, problem.fit(problem.start(problem.like, offset), data.theta_max, effort=ROUGH))
-        for problem, offset in starts
-    ]
+    ends = [(problem, _rough(problem, offset)) for problem, offset in starts]
     problem, found = max(ends, key=lambda end: end[0].log_likelihood(end[1]))
-    return problem, problem.fit(found.x, data.theta_max)
+
+    def fit(x: Floats, least_slope: float | None) -> Minimum:
+        return problem.fit(x, data.theta_max, least_slope=least_slope)
+
+    return problem, grown(fit, problem.lens, found.x, data.theta_max)
+
+
+def _rough(problem: CurveProblem, offset_px: float) -> Minimum:
+    start = problem.start(problem.like, offset_px)
+    least_slope = HELD_SLOPES[0]  # a valley of lenses that grow
+    return problem.fit(start, problem.data.theta_max, least_slope=least_slope, effort=ROUGH)
 
 
 def _simpler(problem: CurveProblem, offset: float) -> list[tuple[CurveProblem, float]]:
@@ -214,18 +229,3 @@ def rank(fits: Sequence[AnyFit]) -> list[AnyFit]:
     if len({(len(fit.residuals_px), fit._minimum.loss) for fit in fits}) > 1:
         raise FitError("only fits of the same points, with the same loss, can be ranked")
     return sorted(fits, key=lambda fit: (fit.aicc, len(fit.names)))
-
-
-def _growing(model: str, problem: CurveProblem, found: Minimum) -> tuple[Lens, Minimum]:
-    """The lens of a minimum, from a steeper bound where it stops growing between the cells."""
-    theta_max = problem.data.theta_max
-    lens = problem.lens(found.x)
-    for least_slope in (5 * LEAST_SLOPE, 20 * LEAST_SLOPE):
-        if lens is None or grows(lens, theta_max):
-            break
-        found = problem.fit(found.x, theta_max, least_slope=least_slope)
-        lens = problem.lens(found.x)
-    if lens is None:
-        raise FitError(f"{model} does not fit these points: no lens comes near them")
-    check_growth(lens, theta_max, model)
-    return lens, found

@@ -14,8 +14,9 @@ from ..lens import Floats, Lens, vector
 from ..rotations import RDF_FROM_FRD
 from ._camera_problem import STRETCHES, CameraProblem
 from ._curve_data import checked
+from ._grown import HELD_SLOPES, grown
 from ._minimum import FAIR, LOSSES, Minimum
-from ._models import LEAST_SLOPE, check_end, check_growth, grows, known_model, radius_of
+from ._models import check_end, check_growth, known_model, radius_of
 from ._scores import Scored, log_likelihood
 from .curve import best_curve
 
@@ -62,6 +63,7 @@ class PointFit(Scored):
                 self.camera.theta_max,
                 loss=self._minimum.loss,
                 scale=self._minimum.scale,
+                least_slope=HELD_SLOPES[-2] if self.forced else None,
                 effort=FAIR,
             )
             residuals[out] = unseen.residuals_px(found.x)
@@ -145,12 +147,11 @@ def fit_points(
             f"not {len(points)}"
         )
     theta_max = float(problem.angles(start)[0].max())
-    found = problem.fit(start, theta_max, loss=loss)
-    for least_slope in (5 * LEAST_SLOPE, 20 * LEAST_SLOPE):
-        lens = problem.lens(found.x)
-        if lens is not None and grows(lens, theta_max):
-            break
-        found = problem.fit(found.x, theta_max, loss=loss, least_slope=least_slope)
+
+    def fit(x: Floats, least_slope: float | None) -> Minimum:
+        return problem.fit(x, theta_max, loss=loss, least_slope=least_slope)
+
+    found = grown(fit, problem.lens, start, theta_max)
     theta_max = float(problem.angles(found.x)[0].max())
     return PointFit(
         model=model,

@@ -19,8 +19,9 @@ from ..lens import MODELS, BentLens, Floats, Lens
 from ..resolution import around_axis, inside_picture, places, ray_at, resolution_at, sample_places
 from ._camera_problem import STRETCHES, CameraProblem
 from ._curve_data import checked
+from ._grown import grown
 from ._minimum import Minimum
-from ._models import LEAST_SLOPE, growth_end, known_model, let_free, model_end, round_parameters
+from ._models import growth_end, known_model, let_free, model_end, round_parameters
 from .curve import best_curve
 from .splined import refit_splined
 
@@ -28,7 +29,6 @@ from .splined import refit_splined
 # seldom better than 0.3 pixels, and a straight edge bent by half a pixel still looks straight.
 LIMIT_SHARE = 0.5e-3
 COLUMNS_FIT, COLUMNS_CHECK = 36, 150
-HOPELESS = 0.01  # of the picture: a lens that far off is not worth more tries
 LEAST_FIELD = np.radians(1.0)
 
 
@@ -158,8 +158,11 @@ def _fitted(
         free &= round_parameters(like, np.linspace(0, end, 20))
     problem = CameraProblem(rays, pixel, like, free, camera.stretch, which)
     x = problem.start(np.asarray(camera.center))
-    found = problem.fit(x, end, loss="linear")
-    found = _steeper(problem, found, end)
+
+    def fit(x: Floats, least_slope: float | None) -> Minimum:
+        return problem.fit(x, end, loss="linear", least_slope=least_slope)
+
+    found = grown(fit, problem.lens, x, end)
     lens = problem.lens(found.x)
     if lens is None:
         raise FitError(f"no {model} lens comes near this one")
@@ -174,18 +177,6 @@ def _start(camera: Camera, model: str, end: float, held: Sequence[str]) -> Lens:
     lens = problem.lens(found.x)
     assert lens is not None, "a fit ends where the parameters make sense"
     return lens
-
-
-def _steeper(problem: CameraProblem, found: Minimum, end: float) -> Minimum:
-    """The same from steeper bounds on while the lens stops growing between the cells."""
-    for least_slope in (5 * LEAST_SLOPE, 20 * LEAST_SLOPE):
-        lens, off_px = problem.lens(found.x), np.sqrt(np.mean(found.values**2))
-        if off_px > HOPELESS * problem.size_px:
-            break
-        if lens is None or growth_end(lens, end) >= end * (1 - 1e-6):
-            break
-        found = problem.fit(found.x, end, loss="linear", least_slope=least_slope)
-    return found
 
 
 def camera_of(
