@@ -1,10 +1,9 @@
-"""`fit_curve`: known lenses come back, with uncertainties that are right, whatever a few points do."""
+"""`fit_curve`: known lenses come back, with uncertainties that are right, outliers or not."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from lens_examples import EXAMPLES
 
 from freelook.errors import FitError
 from freelook.fitting import CurveFit, curve_models, fit_curve, rank
@@ -21,6 +20,7 @@ from freelook.lens import (
     growth_limit,
     vector,
 )
+from lens_examples import EXAMPLES
 
 THETA = np.radians(np.arange(3.0, 94, 3))
 KB = KannalaBrandt(278.667, -0.0137, 0.0207, -0.01279, 0.00252)

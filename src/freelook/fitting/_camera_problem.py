@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -72,8 +73,9 @@ class CameraProblem:
         return float(x[at]), float(x[at + 1])
 
     def stretch_of(self, x: Floats) -> Floats:
-        """2 x 2; entries that are not sought are 0 beside the diagonal, and as given on it."""
-        stretch = np.diag(np.diag(self.stretch)).astype(float)
+        """2 x 2; what is not sought is that of square pixels, upright and not mirrored anew."""
+        (xx, _), (_, yy) = self.stretch.tolist()
+        stretch = np.diag([xx, math.copysign(xx, yy)])
         at = self._lens_size + 2
         for place, entry in enumerate(self._entries):
             stretch[entry] = x[at + place]

@@ -1,9 +1,10 @@
 """A camera of another lens model that projects as nearly the same as that model can.
 
-Rays are taken evenly over the picture (so that every part of it counts by its area), and the
-parameters of the new lens, its centre and the upper triangle of its stretch (fx, fy and skew of
-other programs) are found by least squares. Where one model contains the other the result is the
-same lens to the last digits; where not, the differences that remain are measured and told.
+Rays are taken evenly over the picture (so that every part of it counts by its area), some more
+along its border and the rim of the field (for that is where lenses part). The parameters of the
+new lens, its centre and the upper triangle of its stretch (fx, fy and skew of other programs) are
+found by least squares. Where one model contains the other the result is the same lens to the last
+digits; where not, the differences that remain are measured and told.
 """
 
 from __future__ import annotations
@@ -92,27 +93,30 @@ def refit(
     if model == "splined_stereographic":
         found = refit_splined(camera, end, stretch)
     else:
-        found = _fitted(camera, model, field_rays(camera, end, COLUMNS_FIT), end, stretch, held)
+        rays = np.concatenate(field_rays(camera, end, COLUMNS_FIT))
+        found = _fitted(camera, model, rays, end, stretch, held)
     limit = limit_px(camera.size) if limit is None else limit
     return measure(replace(camera, theta_max=wanted), found, limit)
 
 
 def measure(old: Camera, new: Camera, limit: float) -> Refit:
     """How far `new` is from `old`, over the picture."""
-    rays = field_rays(old, old.theta_max, COLUMNS_CHECK)
+    inner, edge = field_rays(old, old.theta_max, COLUMNS_CHECK)
+    rays = np.concatenate([inner, edge])
     pixel, theta = old.project(rays), np.arctan2(np.hypot(rays[:, 0], rays[:, 1]), rays[:, 2])
     off_px = np.linalg.norm(new.project(rays) - pixel, axis=-1)
     seen = np.isfinite(off_px)
     if not seen.any():
         raise FitError("the new lens sees nothing of what the old one sees")
+    even = np.arange(len(rays))[seen] < len(inner)  # of which the mean is taken
     off_deg = _off_deg(new, rays[seen], pixel[seen], off_px[seen])
     beyond = theta[~seen | (off_px > limit)]
     holds_to = min(float(beyond.min(initial=np.inf)), old.theta_max)
     return Refit(
         camera=new,
-        rms_px=_rms(off_px[seen]),
+        rms_px=_rms(off_px[seen][even]),
         max_px=float(off_px[seen].max()),
-        rms_deg=_rms(off_deg),
+        rms_deg=_rms(off_deg[even]),
         max_deg=float(off_deg.max()),
         field_deg=float(np.degrees(2 * holds_to)),
         seen=float(seen.mean()),
@@ -120,21 +124,24 @@ def measure(old: Camera, new: Camera, limit: float) -> Refit:
     )
 
 
-def field_rays(camera: Camera, theta_max: float, columns: int) -> Floats:
-    """(n, 3) unit rays even over the picture, with its border and the rim of the field.
+def field_rays(camera: Camera, theta_max: float, columns: int) -> tuple[Floats, Floats]:
+    """Unit rays even over the picture, and others along its border and the rim of the field.
 
-    None is farther from the axis than theta_max (radians).
+    (n, 3) and (m, 3); none is farther from the axis than theta_max (radians).
     """
-    inner = places(*sample_places(camera.size, columns)).reshape(-1, 2)
-    rays = np.concatenate([camera.ray(inner), camera.ray(_border(camera.size, columns))])
+    inner = camera.ray(places(*sample_places(camera.size, columns)).reshape(-1, 2))
     rim = ray_at(np.array(theta_max * (1 - 1e-12)), around_axis(4 * columns))
     rim = rim[inside_picture(camera.project(rim), camera.size)]
-    rays = np.concatenate([rays[np.isfinite(rays[:, 0])], rim])
-    theta = np.arctan2(np.hypot(rays[:, 0], rays[:, 1]), rays[:, 2])
-    rays = rays[theta <= theta_max]
-    if len(rays) < 2 * columns:
+    edge = np.concatenate([camera.ray(_border(camera.size, columns)), rim])
+    inner, edge = _within(inner, theta_max), _within(edge, theta_max)
+    if len(inner) < columns:
         raise FitError("next to nothing of this lens's field is on its picture")
-    return rays
+    return inner, edge
+
+
+def _within(rays: Floats, theta_max: float) -> Floats:
+    rays = rays[np.isfinite(rays[:, 0])]
+    return rays[np.arctan2(np.hypot(rays[:, 0], rays[:, 1]), rays[:, 2]) <= theta_max]
 
 
 def _border(size: tuple[int, int], columns: int) -> Floats:

@@ -26,11 +26,9 @@ def refit_splined(camera: Camera, theta_max: float, which: str = "skew") -> Came
     not allow of the stretch goes into the surface.
     """
     theta, phi, u = _samples(theta_max)
-    stretch = np.diag(np.diag(camera.stretch)).astype(float)
+    stretch = camera.stretch[0, 0] * np.eye(2)
     for entry in STRETCHES[which]:
         stretch[entry] = camera.stretch[entry]
-    if which == "none":
-        stretch = np.diag([stretch[0, 0]] * 2)
     f = float(radius_slope(camera.lens, np.zeros(1))[0])
     point = (camera.project(ray_at(theta, phi)) - camera.center) @ np.linalg.inv(stretch).T
     fov_x_deg = min(float(np.ceil(np.degrees(2 * theta_max))), 355.0)  # mrcal takes whole ones
