@@ -7,7 +7,7 @@ threads, clocks or pages: `step` is given the newest picture and the time; someb
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -26,7 +26,7 @@ from .views import FEWEST_POINTS, View
 
 # The target is followed in a picture of at most this many pixels along its longer side; once it is
 # to be taken it is looked for at full size.
-FOLLOWED_PX = 1024
+FOLLOWED_PX = 960
 LEAST_SHARE = 0.4  # of the most points ever seen: with fewer, most of the board is hidden
 FIRST_SOLVE = 4  # views
 MOST_VIEWS = 40  # that are taken without being asked for
@@ -37,7 +37,7 @@ SENTENCES = {
     "hidden": "Only a small part of the board is seen",
     "moving": "Hold still",
     "blurred": "Blurred: more light, or another distance",
-    "known": "This view is there already: hold the board elsewhere, or tilt it",
+    "known": "This view is there already",
     "many": "Many views are there: finish, or take more by hand",
     "coarse": "Not clear enough to be taken: hold the board nearer",
     "taken": "Taken",
@@ -170,6 +170,10 @@ class LiveCalibration:
         self._wanted = False
         return self._state(size, now_ns, verdict, found, held)
 
+    def again(self, state: LiveState) -> LiveState:
+        """The same look, with what has changed since: views, history, where to hold next."""
+        return self._state(state.size, state.now_ns, state.verdict, state.found, state.held)
+
     def _verdict(self, gray: Gray, found: View | None, held: float) -> str:
         """What stands in the way of taking this view; "taken" if nothing does."""
         if found is None:
@@ -259,13 +263,15 @@ def solve_views(
     size: tuple[int, int],
     model: str = "kannala_brandt",
     freedom: Freedom | None = None,
+    *,
+    say: Callable[[str], None] = lambda _: None,
 ) -> tuple[Calibration, Progress]:
     """Calibrate, and say how good the result is. CalibrationError as `calibrate`."""
     if len(views) < FIRST_SOLVE:
         raise CalibrationError(
             f"{len(views)} views are too few; take at least {FIRST_SOLVE}, better {ENOUGH_VIEWS}"
         )
-    result = calibrate(views, size, model, freedom)
+    result = calibrate(views, size, model, freedom, progress=say)
     pixels = grid_of(size, 16)
     sure = projection_uncertainty(result.camera, result.solution, result.freedom, pixels).sigma_px
     seen = sure[np.isfinite(sure)]

@@ -23,7 +23,7 @@ RINGS = (0.0, 0.36, 0.7, 1.06)  # a little over the edge, which is known roughly
 EIGHTH = np.pi / 4
 COUNT = 1 + 2 * 8
 WAYS = 64  # directions in which the edge is looked for
-THUMBNAIL = 96
+THUMBNAIL = 192
 LIT = 40  # of 255: video's black is 16, and noise comes on top
 LEAST_REACH = 0.3  # of the way to the picture's border
 
@@ -75,8 +75,10 @@ def _to_border(size: tuple[int, int], center: Floats, ways: Floats) -> Floats:
 
 
 def _smooth(values: Floats) -> Floats:
-    """The median of five neighbours around the circle: a dark spot at the rim is not its end."""
-    return np.asarray(np.median([np.roll(values, k) for k in range(-2, 3)], axis=0))
+    """The median of five neighbours around the circle (a dark spot at the rim is not its end), and
+    of that the mean of three."""
+    median = np.median([np.roll(values, k) for k in range(-2, 3)], axis=0)
+    return np.asarray(np.mean([np.roll(median, k) for k in range(-1, 2)], axis=0))
 
 
 @dataclass(frozen=True)

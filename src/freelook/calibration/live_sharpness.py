@@ -14,6 +14,7 @@ from .targets import Gray
 from .views import View
 
 HOLD_NS = 500_000_000  # so long the target must not move
+LONGEST_GAP_NS = 3_000_000_000  # between two looks; nobody knows what happened in a longer one
 # How far it may drift meanwhile, as a share of the mean side of the picture: 1.2 px of 960. At that
 # speed an exposure of 1/60 s smears it by 0.04 px.
 DRIFT = 0.00125
@@ -32,11 +33,15 @@ class Steadiness:
 
     _anchor: View | None = None
     _since_ns: int = 0
+    _last_ns: int = 0
 
     def look(self, view: View | None, size: tuple[int, int], now_ns: int) -> float:
         """The share of the time to hold still that has passed, 0 to 1; 0 without a target."""
         limit = DRIFT * (size[0] + size[1]) / 2
-        if view is None or self._anchor is None or drift_px(self._anchor, view) > limit:
+        anchor, gap_ns = self._anchor, now_ns - self._last_ns
+        self._last_ns = now_ns
+        moved = view is None or anchor is None or drift_px(anchor, view) > limit
+        if moved or gap_ns > LONGEST_GAP_NS:
             self._anchor, self._since_ns = view, now_ns
             return 0.0
         return min((now_ns - self._since_ns) / HOLD_NS, 1.0)

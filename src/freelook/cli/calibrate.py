@@ -5,6 +5,7 @@
   freelook calibrate shots/*.jpg --board 6x8 --square 0.0325 -o lens.json --report report.html
   freelook calibrate board.mp4 --model auto -o lens.json                    from a video
   freelook calibrate corners/*.orpc --json                                  from known corners
+  freelook calibrate --live /dev/video0 -o lens.json                        with a page that guides
 
 Hold the board close, so that it fills much of the picture, in 10 to 20 places: the middle, all
 around the rim, straight and tilted. Nothing has to be guessed beforehand.
@@ -23,6 +24,8 @@ import numpy as np
 from ..errors import CalibrationError, FreelookError
 from ..lens import MODELS
 from ._arguments import size
+from ._calibrate_live import add_live_arguments, run_live
+from ._profile_text import profile_text
 
 if TYPE_CHECKING:
     from ..calibration.calibrate import Calibration
@@ -30,7 +33,7 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("inputs", nargs="+", metavar="INPUT", help="pictures, videos, corner files")
+    parser.add_argument("inputs", nargs="*", metavar="INPUT", help="pictures, videos, corner files")
     parser.add_argument(
         "--board", type=size, metavar="CxR", help="inner corners across x down (default: found)"
     )
@@ -51,18 +54,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--report", metavar="HTML", help="write a page with pictures of it all")
     parser.add_argument("--json", action="store_true", help="print all figures as JSON")
     parser.add_argument("--overwrite", action="store_true", help="replace files that exist")
+    add_live_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
+    for path in (args.output, args.report):
+        if path and Path(path).exists() and not args.overwrite:
+            raise FreelookError(f"{path} exists; --overwrite replaces it")
+    return run_live(args) if args.live else _run(args)
+
+
+def _run(args: argparse.Namespace) -> int:
     from ..calibration.calibrate import calibrate
     from ..calibration.parameters import Freedom
     from ..calibration.targets import Chessboard
     from ..calibration.words import figures
     from ._target_views import find_views
 
-    for path in (args.output, args.report):
-        if path and Path(path).exists() and not args.overwrite:
-            raise FreelookError(f"{path} exists; --overwrite replaces it")
+    if not args.inputs:
+        raise CalibrationError("give pictures, videos or corner files, or --live SOURCE")
     found = find_views(args.inputs, Chessboard(args.square, args.board), quiet=args.json)
     if not found.views:
         raise CalibrationError(_nothing_found(found))
@@ -146,13 +156,6 @@ def _models(calibration: Calibration):  # type: ignore[no-untyped-def]
 
 
 def _write(args: argparse.Namespace, calibration: Calibration) -> None:
-    from ..formats import Profile, format_module
-
-    source = (
-        f"calibrated from {len(calibration.views)} views, {calibration.rms_px:.3f} px RMS, "
-        f"corners to {np.degrees(calibration.seen_rad):.0f} degrees from the axis"
-    )
-    text = format_module("freelook").write(Profile(calibration.camera, args.name, source))
-    Path(args.output).write_text(text, "utf-8")
+    Path(args.output).write_text(profile_text(args.name, calibration), "utf-8")
     if not args.json:
         print(f"written: {args.output}")

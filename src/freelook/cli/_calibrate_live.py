@@ -1,0 +1,112 @@
+"""`freelook calibrate --live SOURCE`: a page that watches the camera and takes views by itself."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import contextlib
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..errors import CalibrationError, FreelookError
+from ._profile_text import profile_text
+from ._progress import StatusLine
+from .fly import add_serving_arguments, announce, never, opened_door, source_kinds
+
+if TYPE_CHECKING:  # the web libraries are slow to load, and may be missing
+    from ..web.calibration_station import CalibrationStation, Result
+
+
+def add_live_arguments(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("live")
+    group.add_argument(
+        "--live",
+        metavar="SOURCE",
+        help="open a page that shows the camera, says where to hold the board and takes views by "
+        f"itself; a device, an address or KIND:ARGUMENT (kinds: {', '.join(source_kinds())})",
+    )
+    add_serving_arguments(group)
+
+
+def run_live(args: argparse.Namespace) -> int:
+    """Serve the page until Ctrl-C."""
+    from ..calibration.parameters import Freedom
+    from ..calibration.targets import Chessboard
+    from ..ingest import Ingest
+    from ..sources import open_source
+    from ..web.calibration_server import make_calibration_app
+    from ..web.calibration_station import CalibrationStation, Plan
+    from ..web.serving import serve
+
+    _check(args)
+    plan = Plan(
+        args.live,
+        Chessboard(args.square, args.board),
+        lambda result: save(args, result),
+        args.model,
+        Freedom(aspect=not args.square_pixels, skew=args.skew),
+        keep_pictures=bool(args.report),
+    )
+    station = CalibrationStation(Ingest(lambda: open_source(args.live)), plan)
+    with contextlib.ExitStack() as opened, StatusLine() as line:
+        door = opened.enter_context(opened_door(args))
+        serving = serve(
+            make_calibration_app(station, door.guard),
+            door,
+            ready=lambda: announce(door, not args.no_browser, webrtc=False),
+            report=lambda: line.show(summary(station)),
+            until=never,
+        )
+        asyncio.run(serving)
+    return 0
+
+
+def _check(args: argparse.Namespace) -> None:
+    """What would be found out only after the work is done."""
+    if args.inputs:
+        raise CalibrationError(
+            f"--live takes its views from the camera: leave out {args.inputs[0]}, or --live"
+        )
+    if args.json:
+        raise CalibrationError("--json goes with pictures; the live page shows its figures itself")
+    for path in filter(None, (args.output, args.report)):
+        if not Path(path).resolve().parent.is_dir():
+            raise FreelookError(f"{path}: there is no folder to write it to")
+
+
+def save(args: argparse.Namespace, result: Result) -> tuple[str, str]:
+    """The profile, and where it and the report went. FreelookError: it could not be written."""
+    text = profile_text(args.name, result.calibration)
+    if args.report:
+        from ..report.calibration import calibration_page
+
+        title = f"Calibration of {args.name}" if args.name else "Lens calibration"
+        page = calibration_page(result.calibration, result.pictures, title)
+        _write(args.report, page)
+    if not args.output:
+        return text, "not saved at the station: no -o FILE was given"
+    _write(args.output, text)
+    written = " and ".join(str(Path(p).resolve()) for p in (args.output, args.report) if p)
+    return text, f"saved as {written}"
+
+
+def _write(path: str, text: str) -> None:
+    try:
+        Path(path).write_text(text, "utf-8")
+    except OSError as error:
+        raise FreelookError(f"{path} cannot be written: {error.strerror}") from None
+
+
+def summary(station: CalibrationStation) -> str:
+    """The station's state in one line."""
+    status = station.status()
+    source, result = status["source"], station.result
+    size = source["size"]
+    parts = [" ".join(filter(None, (source["state"], size and f"{size[0]}x{size[1]}")))]
+    parts.append(source["message"] or status["message"])
+    parts.append(f"{status['views']} view{'' if status['views'] == 1 else 's'}")
+    if status["phase"] == "finishing":
+        parts.append(f"solving: {status['solving']}")
+    if result is not None:
+        parts.append(f"RMS {result['rms_px']:.3f} px; {result['model']}; {result['where']}")
+    return "; ".join(filter(None, parts))
