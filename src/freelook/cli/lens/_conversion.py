@@ -13,7 +13,7 @@ from ...camera import Camera
 from ...errors import FitError, FreelookError, ProfileError
 from ...fitting.refit import Refit, limit_px, measure, refit
 from ...formats import FORMATS, Choice, Document, Profile, format_module, parse_profile
-from ...lens import MODELS, Lens, model_name, vector
+from ...lens import MODELS, BentLens, Lens, model_name, vector
 from ...rotations import head_angles_deg
 
 Around = Callable[[int], AbstractContextManager[Callable[[], None]]]
@@ -40,6 +40,7 @@ LACKING: dict[str, tuple[tuple[str, ...], ...]] = {
     "mei": (("k3",), ("k3", "p1", "p2"), ("k3", "p1", "p2", "k1", "k2")),
     "opencv_rational": (_TILT, _PRISM, (*_PRISM, "k4", "k5", "k6")),
 }
+_NOTHING: tuple[str, ...] = ()
 STRETCHES = ("free", "skew", "aspect", "none")
 SAME_PX = 1e-6
 READ_BACK_PX = 1e-4  # formats write numbers with 15 to 17 digits; ours are good to 1e-9 px
@@ -230,28 +231,38 @@ def _refitted(
     profile: Profile, camera: Camera, target: str, model: str, limit: float
 ) -> tuple[Refit, str]:
     """The nearest lens of a model that the format can write, and the text."""
-    first = refit(camera, model, stretch="free", limit=limit)
-    stretch, held = _sayable(profile, first.camera, target)
-    if (stretch, held) != ("free", ()):
-        first = refit(camera, model, stretch=stretch, held=held, limit=limit)
-    return first, format_module(target).write(replace(profile, camera=first.camera))
+    stretch, held = _needed_stretch(camera), _NOTHING
+    found = refit(camera, model, stretch=stretch, limit=limit)
+    said = _sayable(profile, found.camera, target, stretch)
+    if said != (stretch, held):
+        found = refit(camera, model, stretch=said[0], held=said[1], limit=limit)
+    return found, format_module(target).write(replace(profile, camera=found.camera))
 
 
-def _sayable(profile: Profile, camera: Camera, target: str) -> tuple[str, tuple[str, ...]]:
+def _needed_stretch(camera: Camera) -> str:
+    """The least that says the camera's own: what would only follow noise is not sought."""
+    (xx, xy), (yx, yy) = camera.stretch.tolist()
+    if isinstance(camera.lens, BentLens) or yx:
+        return "free"
+    return "skew" if xy else "aspect" if xx != yy else "none"
+
+
+def _sayable(
+    profile: Profile, camera: Camera, target: str, stretch: str
+) -> tuple[str, tuple[str, ...]]:
     """How much of the stretch and which parameters to leave out for the format to take it."""
     first: ProfileError | None = None
-    for stretch, held, simpler in _simpler(camera):
+    for kept, held, simpler in _simpler(camera, stretch):
         try:
             format_module(target).write(replace(profile, camera=simpler))
-            return stretch, held
+            return kept, held
         except ProfileError as error:
             first = first or error
     raise FitError(str(first))
 
 
-def _simpler(camera: Camera) -> Iterator[tuple[str, tuple[str, ...], Camera]]:
+def _simpler(camera: Camera, stretch: str) -> Iterator[tuple[str, tuple[str, ...], Camera]]:
     """The camera with ever more left out: parts of the stretch, then parameters of the lens."""
-    model = model_name(camera.lens)
     (xx, xy), (_, yy) = camera.stretch
     stretches = {
         "free": camera.stretch,
@@ -259,10 +270,10 @@ def _simpler(camera: Camera) -> Iterator[tuple[str, tuple[str, ...], Camera]]:
         "aspect": np.diag([xx, yy]),
         "none": np.diag([xx, xx]),
     }
-    for held in ((), *LACKING.get(model, ())):
+    for held in ((), *LACKING.get(model_name(camera.lens), ())):
         lens = _without(camera.lens, held)
-        for stretch in STRETCHES:
-            yield stretch, held, replace(camera, lens=lens, stretch=stretches[stretch])
+        for kept in STRETCHES[STRETCHES.index(stretch) :]:
+            yield kept, held, replace(camera, lens=lens, stretch=stretches[kept])
 
 
 def _without(lens: Lens, held: Sequence[str]) -> Lens:
