@@ -44,7 +44,9 @@ def best_circle(picture: Floats, dark: float, bright: float) -> tuple[Ellipse, E
 
     `dark` and `bright` are the levels of the picture's (rows, columns) dark and bright parts.
     """
-    roughs = (_rough(picture, dark, bright, circles=circles) for circles in (True, False))
+    outer = _outer_places(picture, dark, bright)
+    size = (picture.shape[1], picture.shape[0])
+    roughs = (_rough(outer, size, circles=circles) for circles in (True, False))
     found = [_fine(picture, rough, dark) for rough in roughs if rough]
     return max(found, key=_final_score, default=None)
 
@@ -77,20 +79,21 @@ def arcs_found_deg(circle: Ellipse, edges: Edges, size: Size) -> tuple[float, fl
     return arcs_deg(circle, edges.points, _reach_px(circle), size)
 
 
-def _rough(picture: Floats, dark: float, bright: float, *, circles: bool) -> Ellipse | None:
-    """Step 1: what most of the outermost places support that are brighter than some level."""
-    size = (picture.shape[1], picture.shape[0])
-    corner = float(np.hypot(*size)) / 2
-    middle = Ellipse((size[0] - 1) / 2, (size[1] - 1) / 2, corner)
-    step = max(1.0, corner / 700)
-    rays = smoothed(unroll(picture, middle, 0.3 * SMALLEST * min(size), corner, step))
-    best, most = None, 0.0
-    for share in RIM_LEVELS:
-        level = dark + max(share * (bright - dark), LEAST_LEVEL)
-        found, support = _most_supported(outermost(rays, level), size, circles=circles)
-        if support > most:
-            best, most = found, support
-    return best
+def _outer_places(picture: Floats, dark: float, bright: float) -> list[Floats]:
+    """For several levels: along rays from the middle, the outermost places that are brighter."""
+    rows, columns = picture.shape
+    corner = float(np.hypot(rows, columns)) / 2
+    middle = Ellipse((columns - 1) / 2, (rows - 1) / 2, corner)
+    first, step = 0.3 * SMALLEST * min(rows, columns), max(1.0, corner / 700)
+    rays = smoothed(unroll(picture, middle, first, corner, step))
+    levels = (dark + max(share * (bright - dark), LEAST_LEVEL) for share in RIM_LEVELS)
+    return [outermost(rays, level) for level in levels]
+
+
+def _rough(outer: list[Floats], size: Size, *, circles: bool) -> Ellipse | None:
+    """Step 1: what most of the outermost places of one level support."""
+    found = [_most_supported(points, size, circles=circles) for points in outer]
+    return max(found, key=lambda one: one[1])[0]
 
 
 def _most_supported(points: Floats, size: Size, *, circles: bool) -> tuple[Ellipse | None, float]:
@@ -122,8 +125,9 @@ def _fine(picture: Floats, rough: Ellipse, dark: float) -> tuple[Ellipse, Edges]
     """Steps 2 and 3 around a rough circle."""
     edges = _edges_around(rough, picture, dark)
     now = _envelope(rough, edges)
-    for reach in FIT_REACHES:
-        edges = _edges_around(now, picture, dark)
+    now = _refit(now, edges, FIT_REACHES[0], free_aspect=now.aspect != 1)
+    edges = _edges_around(now, picture, dark)
+    for reach in FIT_REACHES[1:]:
         now = _refit(now, edges, reach, free_aspect=now.aspect != 1)
     bent = now
     for reach in FIT_REACHES[1:]:

@@ -201,33 +201,47 @@ def _levels(picture: Floats, circle: Ellipse) -> tuple[float, float, float]:
 
 def _refuse(why: str) -> NoReturn:
     raise ProfileError(
-        f"no image circle found: {why}. If the lens's image fills the whole picture it has none; "
-        "then only a calibration gives a profile"
+        f"no image circle found: {why}. More pictures of a changing scene, or more light, may show "
+        "it; a lens whose image fills the whole picture has none and must be calibrated "
+        "(freelook calibrate)"
     )
+
+
+def one_parameter_models() -> list[str]:
+    """Names of the lens models that have a scale and nothing else: what a circle determines."""
+    return [name for name, kind in MODELS.items() if len(fields(kind)) == 1]  # type: ignore[arg-type]
+
+
+def unit_radius(model: str, fov_deg: float) -> float:
+    """Where the field of view ends in the image of such a lens with the scale 1.
+
+    ProfileError for other models, and for a field of view that the model cannot have.
+    """
+    if model not in one_parameter_models():
+        raise ProfileError(
+            "a circle gives one number, so the lens model must have one parameter; "
+            f"'{model}' is none of: {', '.join(one_parameter_models())}"
+        )
+    lens = MODELS[model](1.0)  # type: ignore[call-arg]
+    half = np.radians(fov_deg) / 2
+    inside = 0 < half <= lens.hard_limit
+    radius = float(lens.radius(np.array([half]))[0]) if inside else np.inf
+    if not radius < 1e3:  # the tangent of 90 degrees is large, not infinite
+        most = 2 * np.degrees(lens.hard_limit)
+        raise ProfileError(
+            f"no {model} lens has a field of view of {fov_deg:g} degrees; it is above 0 and at "
+            f"most {most:.0f}, or less where the image would have no end"
+        )
+    return radius
 
 
 def camera_from_circle(circle: ImageCircle, fov_deg: float, model: str = "equidistant") -> Camera:
     """The camera whose field of view, `fov_deg` across, ends at the image circle.
 
-    `model` is one of the lens models that have a scale and nothing else. ProfileError for others,
-    and for a field of view that the model or the circle cannot have.
+    `model` is one of `one_parameter_models()`. ProfileError for others, and for a field of view
+    that the model or a camera cannot have.
     """
-    known = [name for name, kind in MODELS.items() if len(fields(kind)) == 1]  # type: ignore[arg-type]
-    if model not in known:
-        raise ProfileError(
-            "a circle gives one number, so the lens model must have one parameter; "
-            f"'{model}' is none of: {', '.join(known)}"
-        )
-    one = MODELS[model](1.0)  # type: ignore[call-arg]
-    half = np.radians(fov_deg) / 2
-    if not 0 < half <= one.hard_limit:
-        raise ProfileError(
-            f"a field of view of {fov_deg:g} degrees is more than a {model} lens can have, "
-            f"{2 * np.degrees(one.hard_limit):.0f}"
-            if half > 0
-            else f"a field of view of {fov_deg:g} degrees is none"
-        )
-    scale = circle.radius_px / float(one.radius(np.array([half]))[0])
+    scale = circle.radius_px / unit_radius(model, fov_deg)
     return make_camera(
         circle.size,
         MODELS[model](scale),  # type: ignore[call-arg]

@@ -5,12 +5,15 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import math
+from collections.abc import Callable
 
 from ..camera import Camera
 from ..errors import FreelookError
 from ..formats import FORMATS, Profile, builtin_names, load_profile
 from ..rotations import body_from_view
 from ._arguments import size, three_angles
+
+Seek = Callable[[float | None], Camera]
 
 LENS_HELP = (
     "lens profile: a file of any known format (FILE#NAME for one of several cameras in it), "
@@ -20,12 +23,17 @@ MOUNT_HELP = (
     "how the camera is fixed to the vehicle, degrees right, up, right side down "
     "(write --mount=-10,0,0 with a leading minus)"
 )
+FOV_HELP = (
+    "without --lens the image circle is looked for in the picture: "
+    "the field of view across it (default: 180)"
+)
 
 
 def add_lens_arguments(parser: argparse.ArgumentParser) -> None:
     """--lens and what goes with it; `lens_profile` and `mounted_camera` read them."""
     parser.add_argument("--lens", metavar="PROFILE", help=LENS_HELP)
     add_format_arguments(parser)
+    parser.add_argument("--fov", type=float, metavar="DEG", help=FOV_HELP)
     parser.add_argument("--mount", type=three_angles, metavar="YAW,PITCH,ROLL", help=MOUNT_HELP)
 
 
@@ -47,14 +55,22 @@ def lens_profile(args: argparse.Namespace, name: str) -> Profile:
     return load_profile(name, format=args.lens_format, size=args.lens_size)
 
 
-def mounted_camera(args: argparse.Namespace) -> Camera:
-    """The camera of --lens, turned as --mount says."""
-    if args.lens is None:
+def mounted_camera(args: argparse.Namespace, without_lens: Seek | None = None) -> Camera:
+    """The camera of --lens, turned as --mount says.
+
+    Where --lens is missing it is what `without_lens` makes of --fov; FreelookError without that.
+    """
+    if args.lens is not None and getattr(args, "fov", None) is not None:
+        raise FreelookError("--fov is for when there is no --lens: a profile has its own field")
+    if args.lens is not None:
+        camera = lens_profile(args, args.lens).camera
+    elif without_lens is not None:
+        camera = without_lens(args.fov)
+    else:
         raise FreelookError(
             "which lens does the camera have? give --lens PROFILE, a file or one of: "
             + ", ".join(builtin_names())
         )
-    camera = lens_profile(args, args.lens).camera
     if args.mount is None:
         return camera
     if not all(map(math.isfinite, args.mount)):

@@ -21,6 +21,7 @@ from ..head import Head
 from ..trackers import known_trackers, open_tracker
 from ..viewport import Viewport
 from ._cameras import add_lens_arguments, mounted_camera
+from ._circles import camera_by_circle
 from ._progress import StatusLine, say
 
 if TYPE_CHECKING:  # the web libraries are slow to load, and may be missing
@@ -104,7 +105,8 @@ def run(args: argparse.Namespace) -> int:
     from ..sources import open_source
     from ..web.station import About
 
-    camera = mounted_camera(args)
+    Viewport((16, 9), args.hfov)  # says what is wrong with it before the camera is asked
+    camera = mounted_camera(args, lambda fov_deg: camera_by_circle(args.source, fov_deg))
     ingest = Ingest(lambda: open_source(args.source, loop=args.loop))
     about = About(args.source, False, args.hold, args.ease, args.hfov)
     fly(args, ingest, camera, about, never)

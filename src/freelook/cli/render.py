@@ -25,6 +25,7 @@ from ..types import ColorSpace, Frame
 from ..viewport import Viewport
 from ._arguments import size
 from ._cameras import add_lens_arguments, mounted_camera
+from ._circles import camera_by_circle
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -53,11 +54,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     from ..media.pictures import is_picture
 
-    camera = mounted_camera(args)
     viewport = Viewport(args.size, args.hfov)
     aim = _aim(args)
     if os.path.realpath(args.input) == os.path.realpath(args.output):
         raise FreelookError("IN and OUT are the same file; name another OUT")
+    camera = mounted_camera(args, lambda fov_deg: camera_by_circle(args.input, fov_deg))
     if is_picture(args.input):
         _render_picture(args, camera, aim, viewport)
     else:

@@ -96,6 +96,33 @@ class FileSource:
         finally:
             self._container.close()
 
+    def key_units(self, count: int) -> Iterator[AccessUnit]:
+        """The key units before `count` evenly spread times, by seeking; use it instead of `units`.
+
+        Each comes once: fewer where the recording has fewer of them, none where one cannot seek
+        in it. `media_ns` is as in `units`; `capture_ns` means nothing.
+        """
+        self._start_ns = self._due_ns = 0
+        seen: set[int | None] = set()
+        try:
+            base, length = self._stream.time_base, self._container.duration or 0
+            if not base or not length:
+                return
+            for number in range(count):
+                after_s = length / av.time_base * (number + 0.5) / count
+                place = (self._stream.start_time or 0) + round(after_s / base)
+                self._container.seek(place, stream=self._stream)
+                units = self._packets()
+                unit = next((u for u in map(self._unit, units) if u.key), None)
+                units.close()
+                if unit is not None and unit.media_ns not in seen:
+                    seen.add(unit.media_ns)
+                    yield unit
+        except (FFmpegError, SourceError):  # its index is wrong, or it is cut off
+            return
+        finally:
+            self._container.close()
+
     def close(self) -> None:
         self._closing.set()
 
@@ -113,7 +140,7 @@ class FileSource:
             played += 1
         return played
 
-    def _packets(self) -> Iterator[av.Packet[VideoStream]]:
+    def _packets(self) -> Generator[av.Packet[VideoStream], None, None]:
         bsf_name = _ANNEX_B.get(self._info.codec)
         self._sets = ParameterSets(self._info.codec) if bsf_name else None
         try:
