@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import av
 import cv2
 import numpy as np
 import pytest
@@ -155,3 +156,31 @@ def test_a_camera_that_sees_no_board_is_named(
     cv2.imwrite(str(tmp_path / "0.png"), np.full((400, 400), 90, np.uint8))
     assert main(["calibrate", "stereo", str(rig / "left"), str(tmp_path), *OPTIONS]) == 2
     assert "not found in any picture of the right camera" in capsys.readouterr().err
+
+
+def film(folder: Path, out: Path) -> Path:
+    """Every picture held for two frames; where one is missing, nothing but gray."""
+    pictures = {path.stem[-1]: path for path in folder.iterdir()}
+    size = np.asarray(cv2.imread(str(next(iter(pictures.values()))))).shape
+    with av.open(str(out), "w") as file:
+        stream = file.add_stream("libx264", rate=10, options={"crf": "8"})
+        stream.height, stream.width, stream.pix_fmt = size[0], size[1], "yuv420p"
+        for number in range(len(PLACES)):
+            path = pictures.get(str(number))
+            shown = cv2.imread(str(path)) if path else np.full(size, 90, np.uint8)
+            for _ in range(2):
+                frame = av.VideoFrame.from_ndarray(np.asarray(shown, np.uint8), format="bgr24")
+                file.mux(stream.encode(frame))
+        file.mux(stream.encode(None))
+    return out
+
+
+def test_videos_are_paired_by_frame(
+    rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    videos = [film(rig / side, tmp_path / f"{side}.mp4") for side in ("left", "right")]
+    assert main(["calibrate", "stereo", *map(str, videos), *OPTIONS, "--json"]) == 0
+    figures = json.loads(capsys.readouterr().out)
+    assert (figures["pairs"], figures["singles"]) == (5, 1)
+    translation = figures["rig"]["right_from_left"]["translation"]
+    np.testing.assert_allclose(translation, SHIFT, atol=1e-3)  # compressed: twice as wide
