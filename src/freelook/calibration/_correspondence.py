@@ -18,6 +18,8 @@ from scipy.spatial.transform import Rotation
 from ..lens import Floats
 from .views import Pose, View
 
+Ints = NDArray[np.int64]
+
 SPROUTS = 6  # pairs whose hypotheses are tried on all others
 AGREE_DEG, AGREE_STEPS = 2.0, 0.3  # how near hypotheses count fully: turn, shift in squares
 ACCEPT_DEG, ACCEPT_STEPS = 6.0, 0.6  # and at all
@@ -84,7 +86,7 @@ def _size(sights: Sequence[Sight]) -> float:
     return float(max(np.ptp(sight.left.points, axis=0).max() for sight in sights)) / 10
 
 
-def _cells(view: View, step: float) -> NDArray[np.int64]:
+def _cells(view: View, step: float) -> Ints:
     return np.rint(view.points[:, :2] / step).astype(np.int64)
 
 
@@ -131,9 +133,7 @@ def _front(pose: Pose, view: View) -> float:
     return float(pose.camera_from_target.as_matrix()[:, 2] @ middle)
 
 
-def _shifts(
-    left: NDArray[np.int64], right: NDArray[np.int64], board: tuple[int, int]
-) -> list[NDArray[np.int64]]:
+def _shifts(left: Ints, right: Ints, board: tuple[int, int]) -> list[Ints]:
     """Shifts of `right` (in cells) with which both lie on one board, upright or on its side."""
     low, high = left.min(axis=0), left.max(axis=0)
     own_low, own_high = right.min(axis=0), right.max(axis=0)
@@ -152,7 +152,7 @@ def _shifts(
 
 
 def _votes(
-    turn: Floats, shift: Floats, turns: Floats, shifts: Floats, owner: Floats, step: float
+    turn: Floats, shift: Floats, turns: Floats, shifts: Floats, owner: Ints, step: float
 ) -> float:
     """How many pairs have a hypothesis like this one; near ones count in part."""
     off = _apart(turn, shift, turns, shifts, step)
