@@ -89,11 +89,9 @@ class LineProblem:
                 return best_circles(self.camera(values), points, straggling, along)[1]
 
             def rows(values: Floats, scale: float = scale) -> Floats:
-                return np.concatenate([off(values) / scale, self._assumed(values)])
+                return np.concatenate([_softened(off(values) / scale), self._assumed(values)])
 
-            solution = least_squares(
-                rows, values, loss="soft_l1", x_scale="jac", xtol=1e-7, ftol=1e-7, max_nfev=50
-            )
+            solution = least_squares(rows, values, x_scale="jac", xtol=1e-6, ftol=1e-6, max_nfev=50)
             values = np.asarray(solution.x)
             left = off(values)
             noise = _noise(left, len(left) - 2 * len(lines) - len(values))
@@ -215,6 +213,12 @@ def _triad(normal: Sequence[Floats]) -> Rotation:
     columns[:, third] = np.cross(columns[:, first], columns[:, second])
     columns[:, third] *= np.sign(np.linalg.det(columns))
     return Rotation.from_matrix(columns)
+
+
+def _softened(off: Floats) -> Floats:
+    """The soft L1 loss, for lines only: what was told is not to be shrugged off."""
+    grown = np.sqrt(1 + off**2) + 1
+    return np.asarray(off * np.sqrt(2 / grown))
 
 
 def _differences(function: Callable[[Floats], Floats], values: Floats) -> Floats:

@@ -42,7 +42,7 @@ from ._line_solver import (
 
 FEWEST_LINES = 4
 FEWEST_POINTS = 3  # on a line; two always have a straight line through them
-TELLING_PX = 0.5  # a line whose bend changes by less when the lens does by BEND says nothing
+TELLING_PX = 0.1  # a line whose bend changes by less when the lens does by BEND says nothing
 BEND = 0.1
 THROUGH_CENTER_DEG = 3.0
 FIELD_ERROR_DEG = 1.0
@@ -113,12 +113,14 @@ def refine(
     field_error_deg: float = FIELD_ERROR_DEG,
     radius_error_px: float | None = None,
     center_error_px: float = 0.0,
+    ask_rim: bool = True,
 ) -> LineFit:
     """The Kannala-Brandt camera near this one under which lines are straight.
 
     terms              how many of k1 to k4 are sought
     field_error_deg    standard deviation of the camera's field, from edge to edge
     radius_error_px, center_error_px  of the image circle's radius and centre
+    ask_rim            find out too what the lines alone say of the field; else it is NaN
 
     The result's field ends at the same radius. CalibrationError where there are too few lines,
     lines of two points, or only lines that every lens shows straight.
@@ -129,10 +131,11 @@ def refine(
     check_telling(as_kannala_brandt(camera), usable)
     problem = _problem(camera, terms, field_error_deg, radius_error_px, center_error_px)
     found, kept = _solved(problem, usable)
-    counted = [line for line, k in zip(usable, kept, strict=True) if k]
-    alone = replace(problem, radius_error_px=1e6).solved(counted)
     half, _ = _rim(camera, found)
-    rim, rim_sigma = _rim(camera, alone)
+    rim = rim_sigma = float("nan")
+    if ask_rim:
+        counted = [line for line, k in zip(usable, kept, strict=True) if k]
+        rim, rim_sigma = _rim(camera, replace(problem, radius_error_px=1e6).solved(counted))
     fitted = replace(found.camera, theta_max=half)
     return LineFit(
         camera,
