@@ -29,7 +29,7 @@ def as_kannala_brandt(camera: Camera, terms: int = MOST_TERMS) -> Camera:
     theta = np.linspace(0, camera.theta_max, 200)[1:]
     columns = powers(theta / camera.theta_max, terms)
     values = np.linalg.lstsq(columns, camera.lens.radius(theta), rcond=None)[0]
-    return replace(camera, lens=_lens_of(values, camera.theta_max))
+    return replace(camera, lens=_lens_of(np.asarray(values, np.float64), camera.theta_max))
 
 
 def powers(u: Floats, terms: int) -> Floats:

@@ -53,6 +53,17 @@ ROUNDS = 6
 
 Bools = NDArray[np.bool_]
 
+__all__ = [
+    "Line",
+    "LineFit",
+    "as_kannala_brandt",
+    "check_telling",
+    "great_circles",
+    "line_distances",
+    "refine",
+    "telling_px",
+]
+
 
 @dataclass(frozen=True)
 class LineFit:
@@ -65,7 +76,7 @@ class LineFit:
                        the errors of what was told; terms that were not sought have zeros
     scale_sigma        standard deviation of ln s in tan(theta) -> s tan(theta)
     rim_deg, rim_sigma_deg  full field of view where the lines alone, without being told, put the
-                       image circle; without the field's error
+                       image circle; NaN where they put it nowhere
     noise_px           of a point, by its distance from its circle
     together           so many points of a line err as one: how much less they say
     """
@@ -92,6 +103,15 @@ class LineFit:
     def rms_px(self) -> float:
         """The same, after."""
         return self._rms(self.after)
+
+    def radius_sigma_px(self, theta: Floats) -> Floats:
+        """Standard deviation of the lens's radius at angles (n,) from the axis, pixels."""
+        lens = self.camera.lens
+        assert isinstance(lens, KannalaBrandt)
+        odd = powers(theta, MOST_TERMS)
+        by_f = lens.radius(theta) / lens.f
+        slopes = np.column_stack([by_f, lens.f * odd[:, 1:]])
+        return np.sqrt(np.einsum("ni,ij,nj->n", slopes, self.covariance[:5, :5], slopes))
 
     def _rms(self, parts: Sequence[Floats]) -> float:
         counted = [part for part, kept in zip(parts, self.kept, strict=True) if kept]
@@ -132,6 +152,8 @@ def refine(
     problem = _problem(camera, terms, field_error_deg, radius_error_px, center_error_px)
     found, kept = _solved(problem, usable)
     half, _ = _rim(camera, found)
+    if np.isnan(half):
+        half = growth_limit(found.camera.lens, camera.theta_max)
     rim = rim_sigma = float("nan")
     if ask_rim:
         counted = [line for line, k in zip(usable, kept, strict=True) if k]
@@ -207,7 +229,25 @@ def _checked(lines: Sequence[Line]) -> list[Line]:
             f"{len(lines)} lines are too few: at least {FEWEST_LINES}, better 20, in different "
             "directions and parts of the picture"
         )
+    for picture in dict.fromkeys(line.picture for line in lines if line.along):
+        _check_directions([line for line in lines if line.along and line.picture == picture])
     return list(lines)
+
+
+def _check_directions(lines: Sequence[Line]) -> None:
+    """Of one picture: at most three, at least two, one of them told by two lines."""
+    names = [line.along for line in lines]
+    known = ", ".join(dict.fromkeys(names))
+    where = f" in {lines[0].picture}" if lines[0].picture else ""
+    if len(set(names)) > 3:
+        raise CalibrationError(
+            f"lines along {known}{where}: there are no more than three directions at right angles"
+        )
+    if len(set(names)) < 2 or max(map(names.count, names)) < 2:
+        raise CalibrationError(
+            f"lines along {known}{where}: at least two directions at right angles are needed, and "
+            "two lines along one of them; or leave the column 'along' empty"
+        )
 
 
 def check_telling(camera: Camera, lines: Sequence[Line]) -> None:
@@ -253,11 +293,17 @@ def _straight_enough(parts: Sequence[Floats]) -> Bools:
 
 
 def _rim(told: Camera, found: Found) -> tuple[float, float]:
-    """The angle, and its sigma, where the told rim's radius is under the found lens; radians."""
+    """The angle, and its sigma, where the told rim's radius is under the found lens; radians.
+
+    NaN where that lens has no such radius.
+    """
     half, lens = told.theta_max, found.camera.lens
     rim_px = float(told.lens.radius(np.array([half]))[0])
     theta = np.linspace(0, growth_limit(lens, min(np.pi, RIM_WITHIN * half)), 8001)
-    at = float(np.interp(rim_px, lens.radius(theta), theta))
+    radius = lens.radius(theta)
+    if rim_px >= radius[-1]:  # it stops growing before
+        return float("nan"), float("nan")
+    at = float(np.interp(rim_px, radius, theta))
     count = 1 + found.terms
     by_values = powers(np.array([at / half]), found.terms)[0]
     slope = float(radius_slope(lens, np.array([at]))[0])

@@ -23,8 +23,7 @@ from ..errors import CalibrationError
 from ..lens import Floats
 from ..types import Plane
 from ._great_circles import Line
-from ._line_solver import as_kannala_brandt
-from .lines import LineFit, line_distances, refine, telling_px
+from .lines import LineFit, as_kannala_brandt, line_distances, refine, telling_px
 
 BLUR = 1.2  # sigma of the picture's smoothing, pixels
 STRONG = 92.0  # percentile of the gradient inside the circle that begins an edge
@@ -151,7 +150,7 @@ def refine_with_segments(
         chains += find_chains(gray, camera, name)
         progress()
     current = camera
-    for stray in STRAYS:
+    for stray in STRAYS if chains else STRAYS[-1:]:
         lines = [*told, *_most_telling(straight_pieces(chains, current, stray), current)]
         fit = refine(
             camera,

@@ -17,7 +17,7 @@ from ..errors import FreelookError, MissingExtra
 
 COMMANDS = (
     *("demo", "fly", "render", "simulate", "lens"),
-    *("calibrate", "calibrate mount", "calibrate stereo"),
+    *("calibrate", "calibrate lines", "calibrate mount", "calibrate stereo"),
     *("paper", "bench", "doctor"),
 )
 
