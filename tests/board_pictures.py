@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from freelook.calibration.views import View
 from freelook.camera import Camera
 
 Floats = NDArray[np.float64]
@@ -86,6 +87,18 @@ class Board:
         lean = Rotation.from_rotvec(np.radians([held.tilt_deg[0], held.tilt_deg[1], 0.0]))
         roll = Rotation.from_rotvec([0.0, 0.0, np.radians(held.roll_deg)])
         return there * lean * roll, ray * held.distance
+
+    def view(self, held: Held, name: str = "view") -> View:
+        """All corners that lie in the picture, exactly."""
+        columns, rows = self.inner
+        j, i = (part.ravel() for part in np.mgrid[0:rows, 0:columns])
+        flat = np.column_stack([i - (columns - 1) / 2, j - (rows - 1) / 2, np.zeros(len(i))])
+        camera_from_board, middle = self.pose(held)
+        pixels = self.camera.project(camera_from_board.apply(flat * self.square) + middle)
+        inside = np.isfinite(pixels[:, 0]) & (pixels > 0).all(1)
+        inside &= (np.nan_to_num(pixels) < np.array(self.camera.size) - 1).all(1)
+        points = np.column_stack([i, j, np.zeros(len(i))]) * self.square
+        return View(name, points[inside], pixels[inside])
 
     def _on_board(self, rays: NDArray[np.float32], held: Held) -> tuple[Floats, NDArray[np.bool_]]:
         """Drawn-board pixels (..., 2) that rays meet, and whether they do, in front."""

@@ -155,8 +155,8 @@ class LiveCalibration:
         """Look at the newest picture (rows, columns), taken at or before `now_ns`."""
         size = (gray.shape[1], gray.shape[0])
         if self._guide is None or (self._guide.size != size and not self._views):
-            self.restart()
             self._guide = Guide(size)
+            self._steadiness.forget()
         if self._guide.size != size:
             self._wanted = False
             self._steadiness.forget()
@@ -207,7 +207,12 @@ class LiveCalibration:
 
     def _update(self) -> None:
         assert self._guide is not None
-        self._guide.update(self._views, self._known.camera if self._known else None)
+        newest = self._history[max(self._history)] if self._history else None
+        self._guide.update(
+            self._views,
+            self._known.camera if self._known else None,
+            newest.uncertainty_px if newest else float("nan"),
+        )
 
     def _state(
         self, size: tuple[int, int], now_ns: int, verdict: str, found: View | None, held: float

@@ -20,6 +20,7 @@ from .targets import Gray
 from .words import DIRECTIONS
 
 RINGS = (0.0, 0.36, 0.7, 1.06)  # a little over the edge, which is known roughly
+RING_AIMS = (0.0, 0.52, 0.77)  # where the middle of a board should be
 EIGHTH = np.pi / 4
 COUNT = 1 + 2 * 8
 WAYS = 64  # directions in which the edge is looked for
@@ -57,7 +58,7 @@ class LitPicture:
         share = np.where(lit.any(axis=1), shares[last], LEAST_REACH)
         if not lit.any():
             return border
-        return np.asarray(border * _smooth(share))
+        return np.minimum(_smooth(border * share), border)
 
     def _is_lit(self, pixels: Floats) -> NDArray[np.bool_]:
         assert self._most is not None
@@ -123,7 +124,7 @@ class Sectors:
         """The pixel (2,) a board should be held at to fill a sector."""
         if number == 0:
             return np.array(self.center)
-        share = (RINGS[ring_of(number)] + min(RINGS[ring_of(number) + 1], 1.0)) / 2
+        share = RING_AIMS[ring_of(number)]
         return np.asarray(self.at(share, np.array([(number - 1) % 8 * EIGHTH]))[0])
 
 

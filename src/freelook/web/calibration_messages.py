@@ -29,7 +29,7 @@ def state(live: LiveState) -> dict[str, Any]:
         and {
             "sentence": live.hold.sentence,
             "outline": pixels(live.hold.outline),
-            "sector": live.hold.sector,
+            "sector": live.hold.about if isinstance(live.hold.about, int) else None,
         },
         "history": [progress(p) for p in live.history],
         "trouble": live.trouble,
