@@ -18,6 +18,7 @@ from ..errors import FreelookError, MissingExtra
 COMMANDS = (
     *("demo", "fly", "render", "simulate", "lens"),
     *("calibrate", "calibrate lines", "calibrate mount", "calibrate stereo"),
+    *("track", "track send"),
     *("paper", "bench", "doctor"),
 )
 

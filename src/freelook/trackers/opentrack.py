@@ -2,7 +2,9 @@
 
 `opentrack:4242` listens on this machine only, `opentrack:0.0.0.0:4242` on all its addresses.
 A datagram holds TX TY TZ (cm, not used here) yaw pitch roll (degrees); a longer one is taken for
-what its first 48 bytes say. Of many that wait only the newest valid one counts.
+what its first 48 bytes say. Of many that wait only the newest valid one counts. What `freelook
+track send` puts behind the 48 bytes (`_trailer.py`) is used if it is there: packets that come too
+late are left out, lost ones are counted, and the pose's time is free of the network's jitter.
 
 Signs: OpenTrack means yaw + right and pitch + up, as here, but roll + left ear down. So its code
 says where it turns an image of a face into angles (tracker-neuralnet) and where it hands them to
@@ -14,21 +16,18 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
 from ..axes import LARGEST_DEG, Axis, AxisMap
 from ..clock import Clock
-from ..datagrams import DatagramListener
-from ..errors import TrackerError
 from ..types import Counters, Pose
+from . import _trailer, _udp
+from ._udp import UdpTracker
 
 KIND = "opentrack"
 OPTIONS: tuple[str, ...] = ()
 AXES = AxisMap(roll=Axis("roll", -1.0))
 DEFAULT_PORT = 4242
-LOOPBACK = "127.0.0.1"
-# More than this waiting at once is a flood, not a tracker; look at it in portions.
-LARGEST_BURST = 4096
 
 _PACKET = struct.Struct("<6d")
 
@@ -41,11 +40,7 @@ def open(argument: str, *, axes: AxisMap, options: Mapping[str, str], clock: Clo
 
 def parse_address(argument: str) -> tuple[str, int]:
     """(host, port) of `PORT`, `HOST:PORT`, `[IPv6]:PORT` or nothing at all."""
-    host, _, port_text = argument.rpartition(":")
-    port_text = port_text or str(DEFAULT_PORT)
-    if not (port_text.isascii() and port_text.isdigit() and int(port_text[:6]) <= 65535):
-        raise TrackerError(f"'{argument}' is not a port or host:port; for example 4242")
-    return host.strip("[]") or LOOPBACK, int(port_text)
+    return _udp.parse_address(argument, DEFAULT_PORT)
 
 
 def parse_packet(datagram: bytes, counters: Counters) -> tuple[float, float, float] | None:
@@ -61,52 +56,34 @@ def parse_packet(datagram: bytes, counters: Counters) -> tuple[float, float, flo
     return yaw, pitch, roll
 
 
-class OpenTrack:
+def make_packet(
+    yaw_deg: float, pitch_deg: float, roll_deg: float, sequence: int, t_ns: int
+) -> bytes:
+    """A datagram for OpenTrack's "UDP over network" input from head angles in our signs, with
+    sequence and time behind it."""
+    position = (0.0, 0.0, 0.0)
+    return _PACKET.pack(*position, yaw_deg, pitch_deg, -roll_deg) + _trailer.pack(sequence, t_ns)
+
+
+class OpenTrack(UdpTracker):
     """A `Tracker` that listens for OpenTrack's datagrams."""
 
     def __init__(self, host: str, port: int, axes: AxisMap, clock: Clock) -> None:
+        counters = Counters()
         self._axes = axes
-        self._clock = clock
-        self._listener = _listen(host, port)
-        self.counters = Counters()
-        self.address = (host, self._listener.port)
+        self._order = _trailer.Order(counters)
+        self._sender_clock = _trailer.SenderClock()
+        super().__init__(host, port, "OpenTrack", self._pose, counters, clock)
 
-    @property
-    def message(self) -> str:
-        host, port = self.address
-        return f"waiting for OpenTrack packets on UDP {host} port {port}"
-
-    def poses(self) -> Iterator[Pose]:
-        while not self._listener.closed:
-            angles = self._newest()
-            if angles is not None:
-                yield Pose(self._axes.body_from_view(*angles), self._clock())
-
-    def close(self) -> None:
-        self._listener.close()
-
-    def _newest(self) -> tuple[float, float, float] | None:
-        """Waits for a datagram, then empties the socket; None if nothing in it was valid."""
-        newest = None
-        datagram = self._listener.receive()
-        for _ in range(LARGEST_BURST):
-            if datagram is None:
-                break
-            self.counters.add("received")
-            angles = parse_packet(datagram, self.counters)
-            if angles is not None and newest is not None:
-                self.counters.add("dropped")
-            newest = angles or newest
-            datagram = self._listener.receive(timeout_s=0)
-        return newest
-
-
-def _listen(host: str, port: int) -> DatagramListener:
-    try:
-        return DatagramListener(host, port)
-    except (OSError, ValueError) as error:  # ValueError: text that cannot be a host's name
-        reason = getattr(error, "strerror", None) or error
-        raise TrackerError(
-            f"cannot listen on UDP {host} port {port}: {reason}; "
-            "is another program using the port, or is the address not one of this machine?"
-        ) from None
+    def _pose(self, datagram: bytes, arrival_ns: int) -> Pose | None:
+        angles = parse_packet(datagram, self.counters)
+        if angles is None:
+            return None
+        t_ns = arrival_ns
+        trailer = _trailer.unpack(datagram[_PACKET.size :])
+        if trailer is not None:
+            sequence, sent_ns = trailer
+            if not self._order.accept(sequence):
+                return None
+            t_ns = self._sender_clock.here(sent_ns, arrival_ns)
+        return Pose(self._axes.body_from_view(*angles), t_ns)
