@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ..camera import Camera
-from ..errors import CalibrationError
+from ..errors import CalibrationError, ProfileError
 from ..lens import Floats
 from .parameters import Freedom, Parameters
 from .slopes import cross_matrices, point_slopes, project, value_slopes
@@ -94,19 +94,19 @@ def solve(
     """
     problem = _Problem(views, camera, freedom or Freedom())
     state = State.of(problem.parameters.values, poses)
-    if robust:
-        state, weights = _robustly(problem, state, steps)
-    else:
-        weights = _asked(problem, counted)
-        state = _minimise(problem, state, lambda _: weights, steps)
-    return _solution(problem, state, weights)
+    with np.errstate(all="ignore"):  # steps may lead anywhere; what is no number is not taken
+        if robust:
+            state, weights = _robustly(problem, state, steps)
+        else:
+            weights = _asked(problem, counted)
+            state = _minimise(problem, state, lambda _: weights, steps)
+        return _solution(problem, state, weights)
 
 
 def resect(camera: Camera, pose: Pose, view: View) -> tuple[Pose, Floats]:
     """The best pose of one view in a known camera, robustly, and its residuals (n, 2)."""
-    problem = _Problem([view], camera, KNOWN)
-    state = _graduated(problem, State.of(np.zeros(0), [pose]))
-    return state.poses[0], problem.residuals(state)
+    poses, residuals = resect_all(camera, [pose], [view], robust=True)
+    return poses[0], residuals[0]
 
 
 def resect_all(
@@ -114,15 +114,23 @@ def resect_all(
     poses: Sequence[Pose],
     views: Sequence[View],
     counted: Sequence[Bools] | None = None,
+    *,
+    robust: bool = False,
 ) -> tuple[tuple[Pose, ...], tuple[Floats, ...]]:
-    """The best pose of each view in a known camera, by plain least squares from good ones on.
+    """The best pose of each view in a known camera, and residuals (n, 2) of all points.
 
-    Only points that are true in `counted` count. With residuals (n, 2) of all points.
+    By plain least squares over the points that are true in `counted`, (n,) a view; None: all.
+    `robust` instead by points that fit, with one noise for all views.
     """
     problem = _Problem(views, camera, KNOWN)
-    weights = _asked(problem, counted)
-    state = _minimise(problem, State.of(np.zeros(0), poses), lambda _: weights, STEPS)
-    residuals = problem.residuals(state)
+    state = State.of(np.zeros(0), poses)
+    with np.errstate(all="ignore"):
+        if robust:
+            state = _graduated(problem, state)
+        else:
+            weights = _asked(problem, counted)
+            state = _minimise(problem, state, lambda _: weights, STEPS)
+        residuals = problem.residuals(state)
     return state.poses, tuple(residuals[part] for part in problem.parts)
 
 
@@ -277,6 +285,8 @@ def _minimise(
         weights = weights_of(residuals)
         cost = float(weights @ _squares(residuals))
         equations = _Equations.of(problem, state, residuals, weights)
+        if not equations.sound:
+            return state
         while True:
             moved, new = _tried(problem, state, equations.step(damping))
             if new is not None and (new_cost := float(weights @ _squares(new))) < cost:
@@ -300,7 +310,7 @@ def _tried(
         with np.errstate(all="raise", under="ignore"):
             moved = state.moved(step)
             residuals = problem.residuals(moved)
-    except (FloatingPointError, ValueError):
+    except (FloatingPointError, ValueError, ProfileError):
         return state, None
     return moved, residuals if np.isfinite(residuals).all() else None
 
@@ -334,6 +344,12 @@ class _Equations:
             products[:, k:-1, -1],
         )
 
+    @property
+    def sound(self) -> bool:
+        """Whether all of it are numbers: near the end of a formula some are not."""
+        parts = (self.camera, self.between, self.poses, self.camera_right, self.poses_right)
+        return all(bool(np.isfinite(part).all()) for part in parts)
+
     def step(self, damping: float) -> tuple[Floats, Floats] | None:
         """(camera values, pose changes (views, 6)), or None where the equations say nothing."""
         poses = self.poses + _diagonal(self.poses, damping)
@@ -344,7 +360,7 @@ class _Equations:
             left = camera - (through @ self.between.swapaxes(1, 2)).sum(0)
             right = self.camera_right - (through @ self.poses_right[:, :, None]).sum(0)[:, 0]
             values = _scaled_solve(left, right)
-        except (np.linalg.LinAlgError, FloatingPointError):
+        except np.linalg.LinAlgError:
             return None
         back = self.poses_right - values @ self.between
         return values, (inverse @ back[:, :, None])[:, :, 0]
@@ -387,13 +403,17 @@ class Adjusted:
 
 def adjusted(problem: Problem, state: State) -> Adjusted:
     """The state adjusted robustly, and what is known about it. CalibrationError as in `solve`."""
-    return _known(problem, *_robustly(problem, state))
+    with np.errstate(all="ignore"):
+        return _known(problem, *_robustly(problem, state))
 
 
 def _known(problem: Problem, state: State, counted: Floats) -> Adjusted:
     residuals = problem.residuals(state)
+    equations = _Equations.of(problem, state, residuals, counted)
+    if not (equations.sound and np.isfinite(residuals).all()):
+        raise CalibrationError(UNDETERMINED)
     try:
-        information = _Equations.of(problem, state, residuals, counted).information()
+        information = equations.information()
     except np.linalg.LinAlgError:
         raise CalibrationError(UNDETERMINED) from None
     scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))

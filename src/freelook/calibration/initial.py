@@ -40,30 +40,56 @@ class Guess:
 def first_guesses(views: Sequence[View], size: tuple[int, int]) -> list[Guess]:
     """The best few guesses, best first; what is best here may lose after refinement."""
     few = _Few(views)
-    scored = [
-        (few.error_px(lens, center), i, lens, center)
-        for i, (lens, center) in enumerate(_candidates(few.pixels, size))
-    ]
-    scored.sort(key=lambda entry: entry[:2])
-    return [_guess(lens, center, views, size, error) for error, _, lens, center in _varied(scored)]
+    scored: list[_Scored] = []
+    for center, lenses in _candidates(few.pixels, size):
+        errors = few.errors_px(lenses, center)
+        scored += [(float(e), lens, center) for e, lens in zip(errors, lenses, strict=True)]
+    scored.sort(key=lambda entry: entry[0])
+    return [_guess(lens, center, views, size, error) for error, lens, center in _varied(scored)]
 
 
 def pose_of(camera: Camera, view: View) -> Pose | None:
-    """Where the target is in one view of a known camera; None if its points are not seen."""
+    """Where the target is in one view of a known camera; None if its points are not seen.
+
+    Points far off the others' plane hardly count.
+    """
     rays = camera.ray(view.pixels)
     seen = np.isfinite(rays[:, 2])
-    return _pose(view.points[seen], rays[seen]) if seen.sum() >= 4 else None
+    if seen.sum() < 4:
+        return None
+    points, rays = view.points[seen], rays[seen]
+    pose = _pose(points, rays)
+    for _ in range(5):
+        at = pose.apply(points)
+        ahead = at / np.maximum(np.linalg.norm(at, axis=1, keepdims=True), 1e-12)
+        off = np.linalg.norm(rays - ahead, axis=1)
+        scale = 3 * max(float(np.median(off)), 1e-9)
+        pose = _pose(points, rays, (1 + (off / scale) ** 2) ** -2)
+    return pose
 
 
-_Scored = tuple[float, int, Lens, tuple[float, float]]
+def mirrored(pose: Pose, view: View) -> Pose:
+    """The other pose from which a small flat target looks much the same: tilted the other way."""
+    middle = view.points.mean(axis=0)
+    _, axes, _ = _plane(view.points)
+    at = pose.apply(middle[None])[0]
+    away, normal = at / np.linalg.norm(at), axes[:, 2]
+    turn = pose.camera_from_target.as_matrix()
+    turn = (
+        (np.eye(3) - 2 * np.outer(away, away)) @ turn @ (np.eye(3) - 2 * np.outer(normal, normal))
+    )
+    return Pose(Rotation.from_matrix(turn), at - turn @ middle)
+
+
+_Scored = tuple[float, Lens, tuple[float, float]]
 
 
 def _varied(scored: list[_Scored]) -> Iterator[_Scored]:
     """The best, then the best of the other shapes: what fits a few points well may not all."""
     shapes = set()
     for entry in scored:
-        if type(entry[2]) not in shapes and np.isfinite(entry[0]):
-            shapes.add(type(entry[2]))
+        if type(entry[1]) not in shapes and np.isfinite(entry[0]):
+            shapes.add(type(entry[1]))
             yield entry
         if len(shapes) == KEPT:
             return
@@ -71,17 +97,19 @@ def _varied(scored: list[_Scored]) -> Iterator[_Scored]:
 
 def _candidates(
     pixels: Floats, size: tuple[int, int]
-) -> Iterator[tuple[Lens, tuple[float, float]]]:
+) -> Iterator[tuple[tuple[float, float], list[Lens]]]:
+    """Centres, and for each the lenses that bring the outermost pixel to some angle."""
     middle = (np.array(size) - 1) / 2
     for dx, dy in product(CENTERS, CENTERS):
         center = middle + np.array([dx, dy]) * size
         farthest = float(np.hypot(*(pixels.reshape(-1, 2) - center).T).max())
+        lenses = []
         for shape, degrees in product(SHAPES, OUTERMOST_DEG):
             if shape is Perspective and degrees > 80:
                 continue
             unit = shape(1.0).radius(np.radians([degrees]))[0]  # type: ignore[call-arg]
-            lens = shape(farthest / unit)  # type: ignore[call-arg]
-            yield lens, (float(center[0]), float(center[1]))
+            lenses.append(shape(farthest / unit))  # type: ignore[call-arg]
+        yield (float(center[0]), float(center[1])), lenses
 
 
 class _Few:
@@ -96,18 +124,27 @@ class _Few:
         flat = np.einsum("vni,vij->vnj", self.points - origins[:, None], axes)
         self.flat = flat[..., :2] / scales[:, None, None]
 
-    def error_px(self, lens: Lens, center: tuple[float, float]) -> float:
-        """Median over the views of their median pixel error, each with its own best pose."""
+    def errors_px(self, lenses: Sequence[Lens], center: tuple[float, float]) -> Floats:
+        """(lenses,) median over the views of their median pixel error, each with its best pose."""
         offset = self.pixels - center
-        theta = _angles(lens, np.hypot(offset[..., 0], offset[..., 1]))
-        rays = _rays(theta, np.arctan2(offset[..., 1], offset[..., 0]))
-        rotation, translation = _flat_pose(self.flat, rays)
-        seen = self.flat @ rotation[..., :2].swapaxes(1, 2) + translation[:, None]
+        radius, phi = np.hypot(offset[..., 0], offset[..., 1]), _direction(offset)
+        theta = np.stack([_angles(lens, radius) for lens in lenses])  # (lenses, views, n)
+        rotation, translation = _flat_pose(self.flat, _rays(theta, phi))
+        seen = self.flat @ rotation[..., :2].swapaxes(-1, -2) + translation[..., None, :]
         theta = np.arctan2(np.hypot(seen[..., 0], seen[..., 1]), seen[..., 2])
-        phi = np.arctan2(seen[..., 1], seen[..., 0])
-        r = lens.radius(np.minimum(theta, 0.999 * lens.hard_limit))
-        error = np.stack([r * np.cos(phi), r * np.sin(phi)], axis=-1) - offset
-        return float(np.median(np.median(np.hypot(error[..., 0], error[..., 1]), axis=-1)))
+        r = np.stack(
+            [
+                lens.radius(np.minimum(t, 0.999 * lens.hard_limit))
+                for lens, t in zip(lenses, theta, strict=True)
+            ]
+        )
+        phi = _direction(seen)
+        error = np.hypot(r * np.cos(phi) - offset[..., 0], r * np.sin(phi) - offset[..., 1])
+        return np.asarray(np.median(np.median(error, axis=-1), axis=-1))
+
+
+def _direction(xy: Floats) -> Floats:
+    return np.arctan2(xy[..., 1], xy[..., 0])
 
 
 def _angles(lens: Lens, radius: Floats) -> Floats:
@@ -128,35 +165,40 @@ def _rays(theta: Floats, phi: Floats) -> Floats:
     return np.stack([sine * np.cos(phi), sine * np.sin(phi), np.cos(theta)], axis=-1)
 
 
-def _pose(points: Floats, rays: Floats) -> Pose:
+def _pose(points: Floats, rays: Floats, weights: Floats | None = None) -> Pose:
     """The pose of a flat target whose points (n, 3) are seen along unit rays (n, 3), linearly."""
     origin, axes, scale = _plane(points)
     flat = (points - origin) @ axes[:, :2] / scale
-    rotation, translation = _flat_pose(flat[None], rays[None])
+    each = None if weights is None else weights[None]
+    rotation, translation = _flat_pose(flat[None], rays[None], each)
     camera_from_target = rotation[0] @ axes.T
     shift = translation[0] * scale - camera_from_target @ origin
     return Pose(Rotation.from_matrix(camera_from_target), shift)
 
 
-def _flat_pose(flat: Floats, rays: Floats) -> tuple[Floats, Floats]:
-    """Rotations (views, 3, 3) and translations (views, 3) from points (views, n, 2) and rays."""
+def _flat_pose(flat: Floats, rays: Floats, weights: Floats | None = None) -> tuple[Floats, Floats]:
+    """Rotations (..., 3, 3) and translations (..., 3) from points (views, n, 2) and rays.
+
+    rays (..., views, n, 3): any number of tries; weights (views, n) of the points.
+    """
     x = np.concatenate([flat, np.ones((*flat.shape[:-1], 1))], axis=-1)
+    pairs = (x[..., :, None] * x[..., None, :]).reshape(*x.shape[:-1], 9)
     # |ray x (H x)|^2 = (H x)^T (I - ray ray^T) (H x), a quadratic form in the nine of H
     across = np.eye(3) - rays[..., :, None] * rays[..., None, :]
-    pairs = x[..., :, None] * x[..., None, :]
-    count = flat.shape[:2]
-    form = across.reshape(*count, 9).swapaxes(1, 2) @ pairs.reshape(*count, 9)  # [ij, kl]
-    form = form.reshape(-1, 3, 3, 3, 3).swapaxes(2, 3).reshape(-1, 9, 9)  # [ik, jl]
-    h = np.linalg.eigh(form)[1][..., 0].reshape(-1, 3, 3)
-    ahead = np.sum(rays * (x @ h.swapaxes(1, 2)), axis=(1, 2))
-    h = h * np.where(ahead < 0, -1.0, 1.0)[:, None, None]
-    length = np.linalg.norm(h[..., :2], axis=1).mean(axis=1)
-    h = h / np.maximum(length, 1e-12)[:, None, None]
-    r1, r2 = h[..., 0], h[..., 1]
-    u, _, vt = np.linalg.svd(np.stack([r1, r2, np.cross(r1, r2)], axis=-1))
-    turn = u @ vt
-    u[..., 2] *= np.where(np.linalg.det(turn) < 0, -1.0, 1.0)[:, None]
-    return u @ vt, h[..., 2]
+    if weights is not None:
+        across = across * weights[..., None, None]
+    form = across.reshape(*rays.shape[:-1], 9).swapaxes(-1, -2) @ pairs  # [ij, kl]
+    form = form.reshape(*rays.shape[:-2], 3, 3, 3, 3).swapaxes(-2, -3)
+    form = form.reshape(*rays.shape[:-2], 9, 9)  # [ik, jl]
+    h = np.linalg.eigh(form)[1][..., 0].reshape(*rays.shape[:-2], 3, 3)
+    ahead = np.sum(rays * (x @ h.swapaxes(-1, -2)), axis=(-2, -1))
+    h = h * np.where(ahead < 0, -1.0, 1.0)[..., None, None]
+    length = np.linalg.norm(h[..., :2], axis=-2).mean(axis=-1)
+    h = h / np.maximum(length, 1e-12)[..., None, None]
+    u, _, vt = np.linalg.svd(h[..., :2], full_matrices=False)
+    r = u @ vt  # the two columns nearest to these that are orthonormal
+    third = np.cross(r[..., 0], r[..., 1])
+    return np.concatenate([r, third[..., None]], axis=-1), h[..., 2]
 
 
 def _plane(points: Floats) -> tuple[Floats, Floats, float]:

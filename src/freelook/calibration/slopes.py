@@ -8,14 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
 from ..camera import Camera
-from ..lens import BentLens, Floats, Lens, image_point, radius_slope, vector, with_vector
+from ..lens import Floats, Lens, image_point, radius_slope, vector, with_vector
 from .parameters import Parameters, difference_step
 
 INSIDE = 1 - 1e-6  # of the angle where a formula ends
+
+
+@cache
+def _is_bent(model: type[Lens]) -> bool:
+    """As isinstance(lens, BentLens), which asks the lens for all it has every time."""
+    return hasattr(model, "offset")
 
 
 def project(camera: Camera, points: Floats) -> Floats:
@@ -25,14 +32,14 @@ def project(camera: Camera, points: Floats) -> Floats:
     What lies out there is wrong anyway; a solver has to find its way back from it.
     """
     polar = _Polar.of(points)
-    at = _lands(camera.lens, isinstance(camera.lens, BentLens), polar)
+    at = _lands(camera.lens, _is_bent(type(camera.lens)), polar)
     return np.asarray(camera.center) + at @ camera.stretch.T
 
 
 def value_slopes(parameters: Parameters, values: Floats, points: Floats) -> Floats:
     """d pixel / d values (n, 2, k) of points (n, 3) in the camera frame."""
     camera, free = parameters.camera_of(values), parameters.freedom
-    bent, polar = isinstance(camera.lens, BentLens), _Polar.of(points)
+    bent, polar = _is_bent(type(camera.lens)), _Polar.of(points)
     columns: list[Floats] = []
     if free.lens:
         columns += [s @ camera.stretch.T for s in _lens_slopes(camera.lens, bent, polar)]
@@ -47,7 +54,7 @@ def value_slopes(parameters: Parameters, values: Floats, points: Floats) -> Floa
 
 def point_slopes(camera: Camera, points: Floats) -> Floats:
     """d pixel / d point (n, 2, 3) of points (n, 3) in the camera frame."""
-    if isinstance(camera.lens, BentLens):
+    if _is_bent(type(camera.lens)):
         return _differences(lambda p: project(camera, p), points)
     return np.asarray(camera.stretch @ _round_slopes(camera.lens, _Polar.of(points)))
 

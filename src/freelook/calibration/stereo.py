@@ -22,7 +22,8 @@ from ..lens import Floats
 from ..rotations import RDF_FROM_FRD
 from ._correspondence import Sight, matched
 from .bundle import Adjusted, Problem, State, adjusted, rms
-from .calibrate import Calibration, Progress, calibrate, with_field
+from .calibrate import Calibration, Progress, calibrate
+from .field import with_field
 from .parameters import Freedom, Parameters
 from .slopes import cross_matrices, point_slopes, project, value_slopes
 from .views import Pose, View

@@ -1,0 +1,244 @@
+"""Lens models tried on the same points, and which of them is taken.
+
+Every candidate is solved robustly, by itself. Then one of them says which points count for all:
+the one nearest to most points (least median residual). Were each to drop its own, a poor model
+would look good by having dropped what it cannot explain. On these points every candidate is solved
+again by plain least squares and cross-validated: the camera is solved without a fifth of the views
+at a time, those views only get their pose, and their residuals tell how the model does on pictures
+it has not seen. A model with more parameters fits better and predicts worse once it is too much.
+
+Taken is the model with the fewest parameters that predicts within 1 % of the best. Not within one
+standard error, as is often done: a lens model is wrong mostly at the rim, where few views reach,
+and over so few views a difference that is all too real is within its standard error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera import Camera, make_camera
+from ..errors import CalibrationError, FreelookError
+from ..fitting.refit import refit
+from ..lens import MODELS, Lens, RadialSpline, growth_limit, vector
+from .bundle import Solution, resect_all, rms, solve
+from .field import MARGIN, seen_angle
+from .parameters import Freedom
+from .views import View
+
+# Tried by `auto`, those with few parameters first; the others are for those who ask for them.
+AUTO = (
+    "equidistant",
+    "equisolid",
+    "stereographic",
+    "perspective",
+    "double_sphere",
+    "eucm",
+    "kannala_brandt",
+    "polynomial",
+    "radial_spline",
+    "thin_prism_fisheye",
+)
+# A model with more parameters must predict at least this much better.
+WORTH_IT = 0.99
+OVERFIT = 1.3  # times the RMS on views left out
+FOLDS = 5
+KNOT_EVERY_DEG = 12.0
+NOT_FROM_BOARDS = {
+    "splined_stereographic": "it has parameters where no corner was seen; radial_spline is as "
+    "flexible along the radius, and mrcal's own result can be read",
+}
+
+Progress = Callable[[str], None]
+Counted = tuple[NDArray[np.bool_], ...]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A model that was tried: how well it fits, how well it predicts, or why it could not be.
+
+    `rms_px` and `cross_validated_px` (RMS, 2-D, per point) of all candidates are over the same
+    points. The latter is NaN with fewer than 3 views, or where the rest did not determine it.
+    """
+
+    model: str
+    rms_px: float = float("nan")
+    cross_validated_px: float = float("nan")
+    solution: Solution | None = None
+    why_not: str = ""
+
+    @property
+    def remark(self) -> str:
+        """In words, if it predicts much worse than it fits."""
+        overfit = self.cross_validated_px > OVERFIT * self.rms_px
+        return "overfit: fits these views, predicts others worse" if overfit else ""
+
+
+def check_model(model: str) -> None:
+    """CalibrationError for a model that is unknown, or cannot be calibrated."""
+    if model == "auto":
+        return
+    if model not in MODELS:
+        raise CalibrationError(f"unknown model '{model}'; known: auto, {', '.join(MODELS)}")
+    if model in NOT_FROM_BOARDS:
+        raise CalibrationError(f"{model} cannot be calibrated here: {NOT_FROM_BOARDS[model]}")
+
+
+def tried(
+    models: Sequence[str],
+    views: Sequence[View],
+    base: Solution,
+    freedom: Freedom,
+    progress: Progress,
+    *,
+    drop: bool = True,
+) -> list[Candidate]:
+    """All models, solved from a Kannala-Brandt solution of the same views on.
+
+    `drop` False: every point counts.
+    """
+    alone = []
+    for model in models:
+        progress(model)
+        alone.append(_alone(model, views, base, freedom, drop))
+    able = [c.solution for c in alone if c.solution is not None]
+    if not able:
+        return alone
+    counted = min(able, key=_median_px).inliers
+    progress("views left out")
+    return [_on_common_points(c, views, freedom, counted) for c in alone]
+
+
+def chosen(candidates: Sequence[Candidate]) -> Candidate:
+    """The one with the fewest parameters that predicts within 1 % of the best.
+
+    With fewer than 3 views nothing can be predicted; the noise per degree of freedom decides then.
+    CalibrationError, with all reasons, if none could be solved.
+    """
+    able = [c for c in candidates if c.solution is not None]
+    if not able:
+        raise CalibrationError("; ".join(f"{c.model}: {c.why_not}" for c in candidates))
+    if any(np.isfinite(c.cross_validated_px) for c in able):
+        able = [c for c in able if np.isfinite(c.cross_validated_px)]
+        scores = [c.cross_validated_px for c in able]
+    else:
+        scores = [c.solution.noise_px for c in able if c.solution is not None]
+    near = [c for c, score in zip(able, scores, strict=True) if score * WORTH_IT <= min(scores)]
+    return min(near, key=_parameters)
+
+
+def cross_validate(solution: Solution, views: Sequence[View], freedom: Freedom) -> float:
+    """RMS in pixels (2-D, per point) on views that the camera was solved without.
+
+    The points that count are the solution's. NaN with fewer than 3 views, and where those that
+    are left do not determine the camera.
+    """
+    used = [i for i, ok in enumerate(solution.inliers) if ok.any()]
+    if len(used) < 3:
+        return float("nan")
+    folds, errors = min(FOLDS, len(used)), []
+    for fold in range(folds):
+        held_out = used[fold::folds]
+        kept = [i for i in used if i not in held_out]
+        try:
+            camera = solve(
+                solution.camera,
+                [solution.poses[i] for i in kept],
+                [views[i] for i in kept],
+                freedom,
+                robust=False,
+                counted=[solution.inliers[i] for i in kept],
+            ).camera
+        except CalibrationError:
+            return float("nan")
+        counted = [solution.inliers[i] for i in held_out]
+        poses, held = [solution.poses[i] for i in held_out], [views[i] for i in held_out]
+        residuals = resect_all(camera, poses, held, counted)[1]
+        errors += [r[ok] for r, ok in zip(residuals, counted, strict=True)]
+    return rms(np.concatenate(errors))
+
+
+def _alone(
+    model: str, views: Sequence[View], base: Solution, freedom: Freedom, drop: bool
+) -> Candidate:
+    try:
+        start = _start(model, base, seen_angle(base, views), freedom)
+        return Candidate(model, solution=solve(start, base.poses, views, freedom, robust=drop))
+    except FreelookError as error:
+        return Candidate(model, why_not=str(error))
+
+
+def _on_common_points(
+    candidate: Candidate, views: Sequence[View], freedom: Freedom, counted: Counted
+) -> Candidate:
+    before = candidate.solution
+    if before is None:
+        return candidate
+    try:
+        solution = solve(before.camera, before.poses, views, freedom, robust=False, counted=counted)
+        _check_growth(solution.camera.lens, seen_angle(solution, views))
+    except FreelookError as error:
+        return Candidate(candidate.model, why_not=str(error))
+    predicted = cross_validate(solution, views, freedom)
+    return Candidate(candidate.model, solution.rms_px, predicted, solution)
+
+
+def _median_px(solution: Solution) -> float:
+    return float(np.median(np.linalg.norm(np.concatenate(solution.residuals), axis=1)))
+
+
+def _parameters(candidate: Candidate) -> int:
+    assert candidate.solution is not None
+    return len(vector(candidate.solution.camera.lens))
+
+
+def _start(name: str, base: Solution, seen: float, freedom: Freedom) -> Camera:
+    """A camera of the wanted model that is near the base solution where points were seen."""
+    if name == "kannala_brandt":
+        return base.camera
+    grows = min(growth_limit(base.camera.lens), seen + MARGIN)
+    known = make_camera(
+        base.camera.size,
+        base.camera.lens,
+        center=base.camera.center,
+        stretch=base.camera.stretch,
+        field_deg=float(np.degrees(2 * grows)),
+    )
+    if name == "radial_spline":
+        return replace(base.camera, lens=_spline_like(known.lens, grows))
+    try:
+        near = refit(known, name, stretch="aspect" if freedom.aspect else "none").camera
+    except FreelookError:  # it may still be solved for, on the points
+        f = float(base.camera.lens.radius(np.array([0.01]))[0] / 0.01)
+        return replace(base.camera, lens=MODELS[name](f))  # type: ignore[call-arg]
+    if near.lens.hard_limit <= np.pi / 2 and seen > np.radians(88):
+        raise CalibrationError(
+            f"{name} lenses end at 90 degrees from the axis; points were seen at "
+            f"{np.degrees(seen):.1f}"
+        )
+    if not freedom.center:
+        return replace(base.camera, lens=near.lens)
+    return replace(base.camera, lens=near.lens, center=near.center, stretch=near.stretch)
+
+
+def _spline_like(lens: Lens, theta_max: float) -> RadialSpline:
+    degrees = np.degrees(theta_max)
+    knots = np.linspace(0, degrees, max(4, round(degrees / KNOT_EVERY_DEG)) + 1)[1:]
+    radii = lens.radius(np.radians(knots))
+    return RadialSpline(tuple(map(float, knots)), tuple(map(float, radii)))
+
+
+def _check_growth(lens: Lens, seen: float) -> None:
+    if lens.hard_limit < seen * 0.999:
+        raise CalibrationError(
+            f"it ends at {np.degrees(lens.hard_limit):.1f} degrees from the axis; points were seen "
+            f"at {np.degrees(seen):.1f}"
+        )
+    limit = growth_limit(lens, seen)
+    if limit < seen * 0.999:
+        raise CalibrationError(
+            f"its radius stops growing at {np.degrees(limit):.1f} degrees, where points were seen"
+        )

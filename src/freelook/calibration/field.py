@@ -1,0 +1,40 @@
+"""How far from the axis a calibrated lens is good for: as far as points were seen, and a little."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..camera import Camera, make_camera
+from ..errors import CalibrationError, ProfileError
+from ..lens import growth_limit
+from .bundle import Solution
+from .views import View
+
+MARGIN = np.radians(5.0)  # beyond the outermost point seen
+
+
+def seen_angle(solution: Solution, views: Sequence[View]) -> float:
+    """The largest angle from the axis of a point that counts, radians."""
+    angles = [0.0]
+    for pose, view, ok in zip(solution.poses, views, solution.inliers, strict=True):
+        at = pose.apply(view.points[ok])
+        if len(at):
+            angles.append(float(np.arctan2(np.hypot(at[:, 0], at[:, 1]), at[:, 2]).max()))
+    return max(angles)
+
+
+def with_field(camera: Camera, seen: float) -> Camera:
+    """The camera with the field it is good for; `seen` is the outermost angle seen, radians."""
+    half = min(seen + MARGIN, growth_limit(camera.lens))
+    try:
+        return make_camera(
+            camera.size,
+            camera.lens,
+            center=camera.center,
+            stretch=camera.stretch,
+            field_deg=float(np.degrees(2 * half)),
+        )
+    except ProfileError as error:
+        raise CalibrationError(f"the result is no lens: {error}") from None
