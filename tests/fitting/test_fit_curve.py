@@ -79,7 +79,7 @@ def normalised(fit: CurveFit, truth: Floats, lens: Lens, offset_px: float) -> tu
     [
         (Equisolid(300), "equisolid", 400.0, "soft_l1", 60),
         (Equisolid(300), "equisolid", 400.0, "linear", 60),
-        (ExtendedUnified(280, 0.6, 1.1), "eucm", None, "soft_l1", 30),
+        (ExtendedUnified(280, 0.6, 1.1), "eucm", None, "linear", 30),
         (KB, "kannala_brandt", None, "linear", 30),
     ],
 )

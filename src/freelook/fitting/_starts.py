@@ -11,13 +11,14 @@ from ..lens import Lens, RadialSpline, vector
 from ._curve_data import CurveData
 from ._models import default_lens, fine_lens, lens_with, let_free, radius_of, scaled
 
+FEW = 3
+
 
 def starting_curves(
     model: str,
     data: CurveData,
     fine: bool = False,
     held: Sequence[str] = (),
-    most: int = 3,
 ) -> list[tuple[Lens, float]]:
     """A few simple lenses of a model, with offsets in pixels.
 
@@ -33,6 +34,8 @@ def starting_curves(
     if not found:
         raise FitError(f"no {model} lens comes near these radii; do they grow with the angle?")
     plain = found[0]  # all at their defaults
+    # found out by trying: models of many parameters reach their deepest valley from anywhere
+    most = 3 if len(vector(plain[1])) <= FEW else 1
     found.sort(key=lambda start: start[0])
     kept = [plain, *(start for start in found[:most] if start is not plain)]
     return [(lens, offset) for _, lens, offset in kept]

@@ -20,8 +20,8 @@ from ..lens import MODELS, BentLens, Floats, Lens
 from ..resolution import around_axis, inside_picture, places, ray_at, resolution_at, sample_places
 from ._camera_problem import STRETCHES, CameraProblem
 from ._curve_data import checked
-from ._grown import grown
-from ._minimum import Minimum
+from ._grown import HELD_SLOPES, grown
+from ._minimum import ROUGH, Minimum
 from ._models import growth_end, known_model, let_free, model_end, round_parameters
 from .curve import best_curve
 from .splined import refit_splined
@@ -30,6 +30,7 @@ from .splined import refit_splined
 # seldom better than 0.3 pixels, and a straight edge bent by half a pixel still looks straight.
 LIMIT_SHARE = 0.5e-3
 COLUMNS_FIT, COLUMNS_CHECK = 36, 150
+HOPELESS = 0.02  # of the picture
 LEAST_FIELD = np.radians(1.0)
 
 
@@ -169,11 +170,19 @@ def _fitted(
     def fit(x: Floats, least_slope: float | None) -> Minimum:
         return problem.fit(x, end, loss="linear", least_slope=least_slope)
 
-    found = grown(fit, problem.lens, x, end)
+    if _is_hopeless(problem, x):
+        found = problem.fit(x, end, loss="linear", least_slope=HELD_SLOPES[0], effort=ROUGH)
+    else:
+        found = grown(fit, problem.lens, x, end)
     lens = problem.lens(found.x)
     if lens is None:
         raise FitError(f"no {model} lens comes near this one")
     return camera_of(problem, found, camera, lens, end)
+
+
+def _is_hopeless(problem: CameraProblem, x: Floats) -> bool:
+    """Whether even the nearest curve is so far off that the last digits do not matter."""
+    return _rms(np.linalg.norm(problem.residuals_px(x), axis=1)) > HOPELESS * problem.size_px
 
 
 def _start(camera: Camera, model: str, end: float, held: Sequence[str]) -> Lens:

@@ -88,8 +88,9 @@ def target_format(path: Path) -> str:
     ]
     if named:
         return max(named, key=lambda name: len(name))  # "py-ocamcalib" holds "ocamcalib"
-    if "freelook" in possible or len(possible) == 1:
-        return possible[0]
+    usual = [name for name in possible if format_module(name).SUFFIX == path.suffix.lower()]
+    if "freelook" in usual or len(usual) == 1:
+        return usual[0]
     raise FreelookError(
         f"a {path.suffix} file can be one of {', '.join(possible)}; say which: --to FORMAT"
     )
@@ -242,9 +243,11 @@ def _refitted(
 def _needed_stretch(camera: Camera) -> str:
     """The least that says the camera's own: what would only follow noise is not sought."""
     (xx, xy), (yx, yy) = camera.stretch.tolist()
-    if isinstance(camera.lens, BentLens) or yx:
+    if yx:
         return "free"
-    return "skew" if xy else "aspect" if xx != yy else "none"
+    if isinstance(camera.lens, BentLens) or xy:
+        return "skew"
+    return "aspect" if xx != yy else "none"
 
 
 def _sayable(
