@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -113,3 +115,13 @@ def test_an_image_height_is_a_length(image: str, capsys: pytest.CaptureFixture[s
     with pytest.raises(SystemExit):
         focal(*BASE[:4], f"--image-height={image}")
     assert "is no length, such as 38 (pixels) or 0.21mm" in capsys.readouterr().err
+
+
+def test_the_limits_in_the_documentation_are_these(capsys: pytest.CaptureFixture[str]) -> None:
+    text = (Path(__file__).parents[2] / "docs" / "lenses.md").read_text("utf-8")
+    said = dict(re.findall(r"^\| (\w+) \| ([\d.]+|never) \|$", text, re.M))
+    rows = found(capsys, *BASE, "36")["models"]
+    assert len(rows) == 5
+    for row in rows:
+        limit = row["good_to_1_percent_deg"]
+        assert said[row["model"]] == ("never" if limit is None else f"{limit:.1f}")
