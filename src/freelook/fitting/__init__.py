@@ -8,7 +8,7 @@ refit.py    a camera of another model that projects as nearly the same as it can
 from __future__ import annotations
 
 from .curve import CurveFit, curve_models, fit_curve, rank
-from .points import PointFit, fit_points
+from .points import PointFit, fit_points, point_models
 from .refit import Refit, refit
 
 __all__ = [
@@ -18,6 +18,7 @@ __all__ = [
     "curve_models",
     "fit_curve",
     "fit_points",
+    "point_models",
     "rank",
     "refit",
 ]

@@ -67,6 +67,10 @@ class Scored:
         return {name: float(value) for name, value in pairs}
 
     @property
+    def loss(self) -> str:
+        return self._minimum.loss
+
+    @property
     def forced(self) -> bool:
         """Whether the data alone would want a radius that stops growing, and it was kept growing.
 

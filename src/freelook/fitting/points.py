@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from ..camera import Camera, make_camera
 from ..errors import FitError, ProfileError
-from ..lens import Floats, Lens, vector
+from ..lens import MODELS, Floats, Lens, vector
 from ..rotations import RDF_FROM_FRD
 from ._camera_problem import STRETCHES, CameraProblem
 from ._curve_data import checked
@@ -22,6 +22,11 @@ from .curve import best_curve
 
 NOT_POINTS = {"splined_stereographic": "its surface has far more parameters than points"}
 GROUPS = 10
+
+
+def point_models() -> list[str]:
+    """Names of the models that can be fitted to points."""
+    return [name for name in MODELS if name not in NOT_POINTS]
 
 
 @dataclass(frozen=True)

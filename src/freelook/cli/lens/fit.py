@@ -21,18 +21,18 @@ parameters with their standard deviations. Outliers hardly pull (loss soft_l1), 
 from __future__ import annotations
 
 import argparse
-import math
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...errors import FitError, FreelookError
 from ...lens import MODELS
 from .._arguments import size
-from ._report import digits, print_json, rounded
+from ._fit_words import fit_facts, print_fits
+from ._report import print_json
 
 if TYPE_CHECKING:
     from ...camera import Camera
@@ -43,9 +43,6 @@ if TYPE_CHECKING:
 
 LOSSES = ("soft_l1", "cauchy", "linear")
 STRETCHES = ("none", "aspect", "skew", "free")
-# Differences in AICc below which models cannot be told apart, and beyond which one has next to no
-# support: Burnham and Anderson, Model Selection and Multimodel Inference, 2002, section 2.6.
-ALIKE, TOLD = 2.0, 10.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -100,12 +97,12 @@ def run(args: argparse.Namespace) -> int:
     plot = _checked_plot(args.plot) if args.plot else None
     fits, refused = _all_fits(args, table)
     best = _best(fits)
-    facts = _facts(args, table, fits, refused, best)
-    camera = _camera(args, best, facts) if args.output else None
+    facts = fit_facts(args.points, table, fits, refused, best)
+    camera = _camera(args, best) if args.output else None
     if args.json:
         print_json(facts)
     else:
-        _print(facts)
+        print_fits(facts)
     told = sys.stderr if args.json else sys.stdout
     if camera is not None:
         _write(args, camera, best)
@@ -145,10 +142,10 @@ def _checked_plot(path: str) -> Path:
 
 def _all_fits(args: argparse.Namespace, table: Table) -> tuple[list[Fit], dict[str, str]]:
     """Ranked, and the models that cannot be fitted with the reasons."""
-    from ...fitting import curve_models, rank
+    from ...fitting import curve_models, point_models, rank
     from .._bars import bar
 
-    known = curve_models()
+    known = curve_models() if table.is_curve else point_models()
     asked = args.model or ["all"]
     names = known if "all" in asked else list(dict.fromkeys(asked))
     fits: list[Fit] = []
@@ -195,131 +192,7 @@ def _best(fits: Sequence[Fit]) -> Fit:
     return next((fit for fit in fits if not fit.overfit and not fit.forced), fits[0])
 
 
-def _facts(
-    args: argparse.Namespace,
-    table: Table,
-    fits: Sequence[Fit],
-    refused: dict[str, str],
-    best: Fit,
-) -> dict[str, Any]:
-    first = fits[0].aicc
-    theta, _ = best.measured
-    lines = [line for line, out in zip(table.lines, best.outliers, strict=True) if out]
-    return {
-        "points": args.points,
-        "count": len(table.lines),
-        "angles_deg": rounded([float(np.degrees(theta.min())), float(np.degrees(theta.max()))]),
-        "loss": args.loss,
-        "best": best.model,
-        "noise_px": rounded(best.noise_px),
-        "outlier_lines": lines,
-        "ranking": [_row(fit, first) for fit in fits],
-        "not_fitted": refused,
-    }
-
-
-def _row(fit: Fit, first: float) -> dict[str, Any]:
-    numbers = {
-        "rms_px": fit.rms_px,
-        "cv_rms_px": fit.cv_rms_px,
-        "cv_ratio": fit.cv_ratio,
-        "noise_px": fit.noise_px,
-        "delta_aicc": fit.aicc - first if math.isfinite(first) else 0.0,
-        "aicc": fit.aicc,
-        "aic": fit.aic,
-        "bic": fit.bic,
-    }
-    return {
-        "model": fit.model,
-        **rounded(numbers),
-        "parameters": rounded(fit.values),
-        "sigma": rounded(fit.sigma),
-        "undetermined": list(fit.undetermined),
-        "overfit": fit.overfit,
-        "forced_to_grow": fit.forced,
-    }
-
-
-def _print(facts: dict[str, Any]) -> None:
-    from rich.console import Console
-
-    console = Console()
-    low, high = facts["angles_deg"]
-    print(f"{facts['points']}: {facts['count']} points from {low:g} to {high:g} degrees")
-    console.print(_table(facts["ranking"]))
-    for row in facts["ranking"]:
-        if row["delta_aicc"] < TOLD or row["model"] == facts["best"]:
-            print(f"{row['model']}: {_parameters(row)}")
-    for line in _verdict(facts):
-        console.print(line, highlight=False, soft_wrap=True, markup=False)
-
-
-def _table(rows: list[dict[str, Any]]) -> Any:
-    from rich.table import Table as RichTable
-
-    table = RichTable()
-    table.add_column("model", no_wrap=True)
-    for column in ("parameters", "rms px", "noise px", "cv rms px", "dAICc", "BIC"):
-        table.add_column(column, justify="right", no_wrap=True)
-    for row in rows:
-        cells = [digits(row[key]) for key in ("rms_px", "noise_px", "cv_rms_px")]
-        criteria = [digits(row[key], ".1f") for key in ("delta_aicc", "bic")]
-        table.add_row(row["model"], str(len(row["parameters"])), *cells, *criteria)
-    return table
-
-
-def _parameters(row: dict[str, Any]) -> str:
-    """Each with as many digits as its standard deviation leaves."""
-    return ", ".join(
-        f"{name} {_with_sigma(value, row['sigma'][name])}"
-        for name, value in row["parameters"].items()
-    )
-
-
-def _with_sigma(value: float, sigma: float | None) -> str:
-    if sigma is None:
-        return f"{value:.4g} ± ?"
-    if sigma <= 0:
-        return f"{value:.6g}"
-    places = min(max(0, 1 - math.floor(math.log10(sigma))), 15)
-    return f"{value:.{places}f} ± {sigma:.2g}"
-
-
-def _verdict(facts: dict[str, Any]) -> list[str]:
-    rows, best = facts["ranking"], facts["best"]
-    by_name = {row["model"]: row for row in rows}
-    alike = [row["model"] for row in rows if row["delta_aicc"] < ALIKE]
-    said = [f"best: {best}, noise {digits(facts['noise_px'])} px"]
-    others = ", ".join(name for name in alike if name != best)
-    if others and best in alike:
-        said.append(f"cannot be told apart from it by these points (AICc within 2): {others}")
-    elif others:
-        said.append(f"AICc alone would take {others}, which is overfit")
-    over = [f"{row['model']} ({row['cv_ratio']:.1f} times)" for row in rows if row["overfit"]]
-    if over:
-        said.append(
-            "overfit, predict points they have not seen much worse than those they have: "
-            + ", ".join(over)
-        )
-    forced = [row["model"] for row in rows if row["forced_to_grow"]]
-    if forced:
-        said.append(f"would stop growing inside the data, and were held: {', '.join(forced)}")
-    if by_name[best]["undetermined"]:
-        said.append(f"not determined by these points: {', '.join(by_name[best]['undetermined'])}")
-    if facts["outlier_lines"]:
-        said.append(f"outliers, look at line {', '.join(map(str, facts['outlier_lines']))}")
-    return said + _not_fitted(facts["not_fitted"])
-
-
-def _not_fitted(refused: dict[str, str]) -> list[str]:
-    """One line for each reason."""
-    by_reason: dict[str, list[str]] = {}
-    for name, why in refused.items():
-        by_reason.setdefault(why.removeprefix(f"{name} "), []).append(name)
-    return [f"not fitted: {', '.join(names)}: {why}" for why, names in by_reason.items()]
-
-
-def _camera(args: argparse.Namespace, best: Fit, facts: dict[str, Any]) -> Camera:
+def _camera(args: argparse.Namespace, best: Fit) -> Camera:
     """What -o writes: its field ends where the measurements do."""
     from ...camera import make_camera
     from ...fitting import CurveFit
