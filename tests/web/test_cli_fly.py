@@ -48,7 +48,8 @@ RTP = "rtp://127.0.0.1:0"
 @pytest.mark.parametrize(
     ("arguments", "why"),
     [
-        (["fly", RTP], "give --lens PROFILE, a file or one of: "),
+        (["fly", "no-such-file.mp4"], "no-such-file.mp4"),
+        (["fly", RTP, "--lens", "demo", "--fov", "180"], "--fov is for when there is no --lens"),
         (["fly", RTP, "--lens", "none"], "lens profile none: "),
         (["fly", "no-such-file.mp4", "--lens", "demo"], "no-such-file.mp4"),
         (["fly", __file__, "--lens", "demo"], "test_cli_fly.py"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,10 +74,14 @@ def through(points: Floats, *, circles: bool) -> Floats:
     )
 
 
-def shares_outside(ellipses: Floats, points: Floats) -> Floats:
+F = TypeVar("F", np.float64, np.float32)
+
+
+def shares_outside(ellipses: NDArray[F], points: NDArray[F]) -> NDArray[F]:
     """(m, n): how far n points lie outside m ellipses, as a share of the radius."""
     x, y, radius, aspect = ellipses.T[..., None]
-    return np.hypot(points[:, 0] - x, (points[:, 1] - y) / aspect) / radius - 1
+    dx, dy = (points[:, 0] - x) / radius, (points[:, 1] - y) / (radius * aspect)
+    return np.asarray(np.sqrt(dx * dx + dy * dy) - 1)
 
 
 def fitted(
@@ -91,12 +96,17 @@ def fitted(
     for _ in range(30):
         angle, radius = now.polar(points)
         off = radius - now.radius
-        root = np.sqrt(weights) * np.clip(1 - (off / reach_px) ** 2, 0, None)
+        near = np.abs(off) < reach_px
+        angle, radius, off = angle[near], radius[near], off[near]
+        weight = weights[near] * (1 - (off / reach_px) ** 2) ** 2
         sine, cosine = np.sin(angle), np.cos(angle)
         columns = [cosine, sine / now.aspect, np.ones_like(off)]
         columns += [radius * sine**2 / now.aspect] if free_aspect else []
-        matrix = np.stack(columns, axis=-1) * root[:, None]
-        x, y, grown, *bent = np.linalg.lstsq(matrix, off * root, rcond=None)[0].tolist()
+        matrix = np.stack(columns, axis=-1)
+        weighted = matrix.T * weight
+        x, y, grown, *bent = np.linalg.lstsq(weighted @ matrix, weighted @ off, rcond=None)[
+            0
+        ].tolist()
         aspect = float(np.clip(now.aspect + sum(bent), *ASPECTS))
         now = Ellipse(now.x + x, now.y + y, now.radius + grown, aspect)
         if np.abs(now.as_row() - start.as_row())[:3].max() > 0.1 * start.radius:

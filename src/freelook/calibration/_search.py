@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,8 +32,11 @@ BLUR = 0.004  # edges are sought in rays blurred by this
 FIT_REACHES = (0.02, 0.012, CLEAR_REACH)
 SEARCHED = (0.86, 1.08)  # around the rough circle; the image ends inside a ring of stray light
 
-HYPOTHESES = 800  # through three of 720 points: enough if a fifth of them are right
-EDGE_HYPOTHESES = 2000
+HYPOTHESES = 500  # through three places each: enough if a fifth of them are right
+EDGE_HYPOTHESES = 1500
+REFINED = 20  # of these, the best that are fitted before one is chosen
+RIVAL_SCORE = 0.85  # of the best circle's
+RIVAL_APART = 0.01
 PART_DEG = 4.0
 
 BENT_SCORE = 0.85  # an ellipse bends to anything a little better than a circle
@@ -39,8 +44,20 @@ LEAST_BENT = 0.015  # pixels that are not square are so by 1.6 % at least
 LEAST_BENT_ARC_DEG = 180.0
 
 
-def best_circle(picture: Floats, dark: float, bright: float) -> tuple[Ellipse, Edges] | None:
-    """The circle or ellipse with most of a rim, and all edges around it; None without any.
+@dataclass(frozen=True)
+class Found:
+    """The likeliest circle or ellipse, all edges around it, and another that is nearly as likely.
+
+    rival  None where the second best has much less of a rim, as it should have
+    """
+
+    circle: Ellipse
+    edges: Edges
+    rival: Ellipse | None
+
+
+def best_circle(picture: Floats, dark: float, bright: float) -> Found | None:
+    """The circle or ellipse with most of a rim; None without any.
 
     `dark` and `bright` are the levels of the picture's (rows, columns) dark and bright parts.
     """
@@ -109,7 +126,7 @@ def _most_supported(points: Floats, size: Size, *, circles: bool) -> tuple[Ellip
     x, y, radius, _ = found.T
     fits = (radius > SMALLEST * min(size)) & (radius < np.hypot(*size))
     found = found[fits & (x > 0) & (x < size[0]) & (y > 0) & (y < size[1])]
-    off = shares_outside(found, points) / ROUGH_REACH
+    off = shares_outside(found, points[::2]) / ROUGH_REACH
     near = np.clip(1 - off**2, 0, None).sum(axis=1)
     best, most = None, 0.0
     for row in found[np.argsort(-near)[:10]].tolist():
@@ -121,10 +138,10 @@ def _most_supported(points: Floats, size: Size, *, circles: bool) -> tuple[Ellip
     return best, most
 
 
-def _fine(picture: Floats, rough: Ellipse, dark: float) -> tuple[Ellipse, Edges]:
+def _fine(picture: Floats, rough: Ellipse, dark: float) -> Found:
     """Steps 2 and 3 around a rough circle."""
     edges = _edges_around(rough, picture, dark)
-    now = _envelope(rough, edges)
+    now, rival = _envelope(rough, edges)
     now = _refit(now, edges, FIT_REACHES[0], free_aspect=now.aspect != 1)
     edges = _edges_around(now, picture, dark)
     for reach in FIT_REACHES[1:]:
@@ -133,8 +150,9 @@ def _fine(picture: Floats, rough: Ellipse, dark: float) -> tuple[Ellipse, Edges]
     for reach in FIT_REACHES[1:]:
         bent = _refit(bent, edges, reach, free_aspect=True)
     if _clearly_bent(bent, edges, (picture.shape[1], picture.shape[0])):
-        return bent, edges
-    return _refit(rounded(now), edges, FIT_REACHES[-1], free_aspect=False), edges
+        return Found(bent, edges, rival)
+    now = _refit(rounded(now), edges, FIT_REACHES[-1], free_aspect=False)
+    return Found(now, edges, rival)
 
 
 def _edges_around(circle: Ellipse, picture: Floats, dark: float) -> Edges:
@@ -144,14 +162,14 @@ def _edges_around(circle: Ellipse, picture: Floats, dark: float) -> Edges:
     return falling_edges(rays, blur_px, dark)
 
 
-def _envelope(about: Ellipse, edges: Edges) -> Ellipse:
+def _envelope(about: Ellipse, edges: Edges) -> tuple[Ellipse, Ellipse | None]:
     """Step 2: the circle that many edges lie on and few clear ones outside of (RANSAC again).
 
     A dark thing at the rim puts a ray's last edge inside the image, but nothing puts a clear
-    one outside: stray light fades. The aspect stays.
+    one outside: stray light fades. The aspect stays. The second is a rival of the first, if any.
     """
     if not edges.weights.any():
-        return about
+        return about, None
     flat = edges.points / (1, about.aspect)  # where the ellipse is a circle
     random = np.random.default_rng(2011)
     chance = edges.weights**2 / (edges.weights**2).sum()
@@ -161,9 +179,30 @@ def _envelope(about: Ellipse, edges: Edges) -> Ellipse:
     grown = found[:, 2] / about.radius
     found = found[(moved < 0.06) & (grown > SEARCHED[0]) & (grown < 1.06)]
     if not len(found):
-        return about
-    x, y, radius, _ = found[np.argmax(_scores(found, flat, edges))].tolist()
-    return Ellipse(x, y * about.aspect, radius, about.aspect)
+        return about, None
+    rows = found[np.argsort(-_quick_scores(found, flat, edges))[: 5 * REFINED]]
+    rows = rows[np.argsort(-_scores(rows, flat, edges))[:REFINED]]
+    rows[:, 1] *= about.aspect
+    rows[:, 3] = about.aspect
+    offered = [
+        _refit(Ellipse(*row), edges, CLEAR_REACH, free_aspect=False) for row in rows.tolist()
+    ]
+    rows = np.array([one.as_row() for one in offered])
+    scores = _scores(rows, edges.points, edges)
+    first = int(np.argmax(scores))
+    away = np.abs(rows - rows[first])[:, :3].max(axis=1) > RIVAL_APART * rows[first, 2]
+    second = int(np.argmax(np.where(away, scores, -np.inf)))
+    rivals = away[second] and scores[second] > RIVAL_SCORE * scores[first]
+    return offered[first], offered[second] if rivals else None
+
+
+def _quick_scores(ellipses: Floats, points: Floats, edges: Edges) -> NDArray[np.float32]:
+    """Nearly the `_scores` of many ellipses: by every other edge, not by ray."""
+    off = shares_outside(ellipses.astype(np.float32), points[::2].astype(np.float32))
+    off /= np.float32(CLEAR_REACH)
+    weights = edges.weights[::2].astype(np.float32)
+    on = np.maximum(1 - off * off, 0) @ weights**2
+    return np.asarray(on - (off > 1.5) @ weights**4)
 
 
 def _scores(ellipses: Floats, points: Floats, edges: Edges) -> Floats:
@@ -177,12 +216,11 @@ def _scores(ellipses: Floats, points: Floats, edges: Edges) -> Floats:
     return np.asarray(count - misplaced)
 
 
-def _final_score(found: tuple[Ellipse, Edges]) -> float:
-    ellipse, edges = found
-    if not len(edges.points):
+def _final_score(found: Found) -> float:
+    if not len(found.edges.points):
         return 0.0
-    score = float(_scores(ellipse.as_row()[None], edges.points, edges)[0])
-    return score if ellipse.aspect == 1 else BENT_SCORE * score
+    score = float(_scores(found.circle.as_row()[None], found.edges.points, found.edges)[0])
+    return score if found.circle.aspect == 1 else BENT_SCORE * score
 
 
 def _refit(start: Ellipse, edges: Edges, reach: float, *, free_aspect: bool) -> Ellipse:

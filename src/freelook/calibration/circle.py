@@ -25,8 +25,8 @@ from ..errors import ProfileError
 from ..lens import MODELS
 from ..types import Plane
 from ._ellipse import Ellipse, Floats
-from ._rim import Edges, unroll
-from ._search import arcs_found_deg, best_circle, errors_of, used
+from ._rim import unroll
+from ._search import Found, arcs_found_deg, best_circle, errors_of, used
 
 SMALLEST_SIDE = 64
 FLATTEST = 6.0  # grey levels between dark and bright parts of a picture that shows something
@@ -54,6 +54,8 @@ class ImageCircle:
     seen_deg      how much of the rim is inside the picture
     found_deg     how much of it has an edge that was used
     used, unused  edge points (n, 2) that the circle was fitted to, and the others around it
+    rival         x, y and radius of another circle that fits nearly as well, if there is one; the
+                  errors are half the way to it then
     """
 
     size: tuple[int, int]
@@ -67,6 +69,7 @@ class ImageCircle:
     found_deg: float
     used: Floats
     unused: Floats
+    rival: tuple[float, float, float] | None = None
 
 
 class Brightness:
@@ -143,11 +146,12 @@ def circle_in(picture: Floats) -> ImageCircle:
     found = best_circle(picture, dark, bright)
     if found is None:
         _refuse("nowhere does it get dark towards the borders")
-    return _checked(picture, *found, dark)
+    return _checked(picture, found, dark)
 
 
-def _checked(picture: Floats, circle: Ellipse, edges: Edges, dark: float) -> ImageCircle:
+def _checked(picture: Floats, found: Found, dark: float) -> ImageCircle:
     """What was found as an answer, or ProfileError when it is no image circle."""
+    circle, edges, rival = found.circle, found.edges, found.rival
     size = (picture.shape[1], picture.shape[0])
     seen_deg, found_deg = arcs_found_deg(circle, edges, size)
     share = LEAST_SHARE if found_deg > LITTLE_DEG else LEAST_SHARE_OF_LITTLE
@@ -165,19 +169,21 @@ def _checked(picture: Floats, circle: Ellipse, edges: Edges, dark: float) -> Ima
             f"outside of the likeliest circle it is not dark ({outside:.0f} of 255, and inside "
             f"{inside:.0f})"
         )
+    doubt = np.zeros(3) if rival is None else (rival.as_row() - circle.as_row())[:3] / 2
     chosen = used(circle, edges)
     return ImageCircle(
         size,
         (circle.x, circle.y),
         circle.radius,
         circle.aspect,
-        float(np.hypot(errors.x, errors.y)),
-        errors.radius,
+        float(max(np.hypot(errors.x, errors.y), np.hypot(*doubt[:2]))),
+        float(max(errors.radius, abs(doubt[2]))),
         rim_px,
         seen_deg,
         found_deg,
         edges.points[chosen],
         edges.points[~chosen],
+        (rival.x, rival.y, rival.radius) if rival else None,
     )
 
 

@@ -28,6 +28,7 @@ MOST_DECODED = 300
 LIVE_S = 2.0
 WAIT_S = 15.0
 DEFAULT_FOV_DEG = 180.0
+NO_PICTURE = "one is needed to find the lens's image circle: start the camera first, or give --lens"
 LUMA = (0.299, 0.587, 0.114)
 
 
@@ -56,11 +57,11 @@ def look_at(inputs: Sequence[str], count: int = PICTURES, *, quiet: bool = False
     if len(inputs) > 1 and not all(map(is_picture, inputs)):
         raise FreelookError("give one video, or pictures of one camera, not a mixture")
     pictures = is_picture(inputs[0])
+    frames = _frames_of_pictures(inputs) if pictures else _frames(inputs[0], count)
+    what = f"{len(inputs)} pictures" if len(inputs) > 1 else inputs[0]
     total = len(inputs) if pictures else None  # a recording may have fewer than are wanted
-    with bar("looking for the image circle", total, "pictures", quiet=quiet) as advance:
-        frames = _frames_of_pictures(inputs) if pictures else _frames(inputs[0], count)
-        what = f"{len(inputs)} pictures" if len(inputs) > 1 else inputs[0]
-        return _seen(frames, what, advance)
+    with bar("looking for the image circle", total, "pictures", quiet=quiet or total == 1) as step:
+        return _seen(frames, what, step)
 
 
 def _seen(frames: Iterator[Frame], what: str, advance: Callable[[], None]) -> Looked:
@@ -133,7 +134,7 @@ def _live_frames(source: Source, name: str, count: int) -> Iterator[Frame]:
     """
     from ..media.decoder import Decoder
 
-    decoder, begun, next_ns = Decoder(), False, 0
+    decoder, begun, first_ns, taken = Decoder(), False, None, 0
     giving_up = threading.Timer(WAIT_S, source.close)
     giving_up.daemon = True
     giving_up.start()
@@ -141,21 +142,20 @@ def _live_frames(source: Source, name: str, count: int) -> Iterator[Frame]:
         for unit in source.units():
             begun = begun or unit.key
             for frame in decoder.decode(unit) if begun else ():
-                if not next_ns:
-                    ends_ns = frame.capture_ns + round(LIVE_S * NS_PER_S)
-                if frame.capture_ns >= next_ns:
-                    next_ns = frame.capture_ns + round(LIVE_S * NS_PER_S / count)
+                first_ns = frame.capture_ns if first_ns is None else first_ns
+                since_s = (frame.capture_ns - first_ns) / NS_PER_S
+                if since_s * count >= taken * LIVE_S:
+                    taken += 1
                     yield frame
-                if frame.capture_ns >= ends_ns:
+                if since_s > LIVE_S or taken == count:
                     return
+    except SourceError as error:
+        raise SourceError(f"{error}; {NO_PICTURE}", retry=error.retry) from None
     finally:
         giving_up.cancel()
         source.close()
-    if not next_ns:
-        raise SourceError(
-            f"{name}: no whole picture came within {WAIT_S:g} s to find the lens's image circle "
-            "in; start the camera first, or give --lens"
-        )
+    if not taken:
+        raise SourceError(f"{name}: no whole picture came within {WAIT_S:g} s; {NO_PICTURE}")
 
 
 def camera_by_circle(source: str, fov_deg: float | None) -> Camera:
@@ -173,8 +173,8 @@ def camera_by_circle(source: str, fov_deg: float | None) -> Camera:
     except ProfileError as error:
         known = ", ".join(builtin_names())
         raise ProfileError(
-            f"there is no --lens, and in {source} {error}. Or give --lens PROFILE, a file or one "
-            f"of: {known}"
+            f"there is no --lens, and in {source} {error}. Or name it: --lens PROFILE, "
+            f"a file or one of: {known}"
         ) from None
     camera = camera_from_circle(circle, fov)
     print(without_lens(looked, circle, fov, told=fov_deg is not None), file=sys.stderr)

@@ -21,6 +21,7 @@ Bgr = tuple[int, int, int]
 RIM: Bgr = (80, 230, 120)
 USED: Bgr = (60, 220, 255)
 UNUSED: Bgr = (90, 90, 235)
+RIVAL: Bgr = (230, 120, 230)
 RINGS: Bgr = (235, 190, 120)
 INK: Bgr = (240, 240, 240)
 FONT = cv2.FONT_HERSHEY_SIMPLEX
@@ -36,6 +37,9 @@ def drawing(picture: Picture, circle: ImageCircle, camera: Camera) -> NDArray[np
     canvas, scale = _backdrop(picture)
     for ring_deg in range(RING_DEG, round(np.degrees(camera.theta_max)), RING_DEG):
         _ring(canvas, camera, np.radians(ring_deg), scale)
+    if circle.rival:
+        *middle, radius_px = circle.rival
+        _ellipse(canvas, (middle[0], middle[1]), radius_px, circle.aspect, scale, RIVAL, 2)
     _ellipse(canvas, circle.center, circle.radius_px, circle.aspect, scale, RIM, 3)
     for pixels, color in ((circle.unused, UNUSED), (circle.used, USED)):
         for x, y in _dots(pixels, scale).tolist():
@@ -114,7 +118,8 @@ def _caption(width: int, circle: ImageCircle, camera: Camera) -> NDArray[np.uint
     ]
     for number, text in enumerate(lines):
         _write(band, text, (line // 2, round((number + 1) * line)), INK, size)
-    legend = (("image circle", RIM), ("edges used", USED), ("edges left out", UNUSED))
+    legend = [("image circle", RIM), ("edges used", USED), ("edges left out", UNUSED)]
+    legend += [("nearly as likely", RIVAL)] if circle.rival else []
     left, base = line // 2, round(3 * line)
     for text, color in legend:
         cv2.circle(band, (left + line // 4, base - line // 5), line // 5, color, -1, cv2.LINE_AA)

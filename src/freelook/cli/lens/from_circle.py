@@ -130,6 +130,7 @@ def _facts(
         "radius_error_px": circle.radius_error_px,
         "aspect": circle.aspect,
         "rim_px": circle.rim_px,
+        "rival": circle.rival and list(circle.rival),
         "seen_deg": circle.seen_deg,
         "found_deg": circle.found_deg,
         "model": args.model,
@@ -153,6 +154,12 @@ def _print(facts: dict[str, Any]) -> None:
         f"  rim     {facts['seen_deg']:.0f} of 360 degrees are in the picture, edges along "
         f"{facts['found_deg']:.0f}; {facts['rim_px']:.0f} px soft"
     )
+    if facts["rival"]:
+        x, y, radius = facts["rival"]
+        print(
+            f"  or else centre {x:.1f}, {y:.1f}, radius {radius:.1f}: that fits nearly as well; "
+            "decide by the drawing, or give more pictures"
+        )
     axis, rim = facts["pixels_per_degree"]
     scale = f"{axis:.2f}" if abs(axis - rim) < 0.005 else f"{axis:.2f} (at the rim {rim:.2f})"
     print(f"  lens    {facts['model']}, {facts['fov_deg']:g} degrees: {scale} pixels per degree")
