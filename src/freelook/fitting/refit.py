@@ -14,15 +14,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..camera import Camera, make_camera
-from ..errors import FitError, ProfileError
+from ..camera import Camera
+from ..errors import FitError
 from ..lens import MODELS, BentLens, Floats, Lens
 from ..resolution import around_axis, inside_picture, places, ray_at, resolution_at, sample_places
 from ._camera_problem import STRETCHES, CameraProblem
+from ._cameras import fitted_camera
 from ._curve_data import checked
 from ._grown import HELD_SLOPES, grown
 from ._minimum import ROUGH, Minimum
-from ._models import growth_end, known_model, let_free, model_end, round_parameters
+from ._models import known_model, let_free, model_end, round_parameters
 from .curve import best_curve
 from .splined import refit_splined
 
@@ -31,7 +32,6 @@ from .splined import refit_splined
 LIMIT_SHARE = 0.5e-3
 COLUMNS_FIT, COLUMNS_CHECK = 36, 150
 HOPELESS = 0.02  # of the picture
-LEAST_FIELD = np.radians(1.0)
 
 
 def limit_px(size: tuple[int, int]) -> float:
@@ -177,7 +177,7 @@ def _fitted(
     lens = problem.lens(found.x)
     if lens is None:
         raise FitError(f"no {model} lens comes near this one")
-    return camera_of(problem, found, camera, lens, end)
+    return fitted_camera(camera, lens, problem.center(found.x), problem.stretch_of(found.x), end)
 
 
 def _is_hopeless(problem: CameraProblem, x: Floats) -> bool:
@@ -193,28 +193,6 @@ def _start(camera: Camera, model: str, end: float, held: Sequence[str]) -> Lens:
     lens = problem.lens(found.x)
     assert lens is not None, "a fit ends where the parameters make sense"
     return lens
-
-
-def camera_of(
-    problem: CameraProblem, found: Minimum, like: Camera, lens: Lens, end: float
-) -> Camera:
-    """The fitted camera with a field that ends at `end`, or where the lens does."""
-    end = min(end, growth_end(lens, end))
-    for _ in range(12):  # a lens that folds only far out is good for less than all
-        if end < LEAST_FIELD:
-            break
-        try:
-            return make_camera(
-                like.size,
-                lens,
-                center=problem.center(found.x),
-                field_deg=float(np.degrees(2 * end)),
-                stretch=problem.stretch_of(found.x),
-                camera_from_body=like.camera_from_body,
-            )
-        except ProfileError:
-            end *= 0.9
-    raise FitError(f"no {type(lens).__name__} lens comes near")
 
 
 def _off_deg(new: Camera, rays: Floats, pixel: Floats, off_px: Floats) -> Floats:

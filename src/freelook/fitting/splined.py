@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import BSpline
 
-from ..camera import Camera, make_camera
-from ..errors import FitError, ProfileError
+from ..camera import Camera
 from ..lens import Floats, SplinedStereographic, radius_slope
 from ..resolution import ray_at
 from ._camera_problem import STRETCHES
+from ._cameras import fitted_camera
 
 # Control points along each side. A fisheye's smooth difference from a stereographic lens is met
 # to about 0.001 px; some MiB of equations.
@@ -37,17 +37,7 @@ def refit_splined(camera: Camera, theta_max: float, which: str = "skew") -> Came
     lens = SplinedStereographic(
         f, ORDER, SIDE, SIDE, fov_x_deg, tuple(float(value) for value in control.ravel())
     )
-    try:
-        return make_camera(
-            camera.size,
-            lens,
-            center=camera.center,
-            field_deg=float(np.degrees(2 * theta_max)),
-            stretch=stretch,
-            camera_from_body=camera.camera_from_body,
-        )
-    except ProfileError as error:
-        raise FitError(str(error)) from None
+    return fitted_camera(camera, lens, camera.center, stretch, theta_max)
 
 
 def _samples(theta_max: float) -> tuple[Floats, Floats, Floats]:
