@@ -10,6 +10,7 @@ import struct
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -21,7 +22,9 @@ from freelook.clock import now_ns
 from freelook.errors import TrackerError
 from freelook.rotations import head_angles_deg
 from freelook.trackers import known_trackers, open_tracker
+from freelook.trackers.elrs import crc8_dvb_s2
 from freelook.types import Pose, Tracker
+from serial_device import SerialDevice
 
 Feed = Callable[[Tracker], None]
 StandIn = tuple[str, Feed]
@@ -55,6 +58,28 @@ def file_stand_in(tmp_path: Path) -> StandIn:
     return f"file:{path}", feed
 
 
+def serial_stand_in(kind: str, frame: bytes, options: str = "") -> Callable[[Path], StandIn]:
+    def stand_in(tmp_path: Path) -> StandIn:
+        device = SerialDevice(tmp_path, f"tty{kind}")
+        PLUGGED_IN.callback(device.close)
+        return f"{kind}:{device.path}{options}", lambda tracker: device.repeat(frame)
+
+    return stand_in
+
+
+PLUGGED_IN = ExitStack()
+HATIRE = struct.pack("<HH6fH", 0xAAAA, 1, 30, -10, 20, 0, 0, 0, 0x5555)
+ELRS = b"$X<\0\x83\x03\6\0" + struct.pack("<3H", *(992 + 10 * angle for angle in (30, 20, 10)))
+ELRS += bytes([crc8_dvb_s2(ELRS[3:])])
+DLKTDR = b'\x02{"panoff":30,"tiltoff":20,"rolloff":10,"Cmd":"Data"}AB\x03\r\n'
+
+
+@pytest.fixture(autouse=True)
+def _unplug() -> Iterator[None]:
+    yield
+    PLUGGED_IN.close()
+
+
 def script_stand_in(tmp_path: Path) -> StandIn:
     path = tmp_path / "poses.csv"
     path.write_text("t_s,yaw_deg,pitch_deg,roll_deg\n0,30,20,10\n")
@@ -66,8 +91,12 @@ def wander_stand_in(tmp_path: Path) -> StandIn:
 
 
 STAND_INS: dict[str, Callable[[Path], StandIn]] = {
+    "csv": serial_stand_in("csv", b"30,20,10\n"),
+    "dlktdr": serial_stand_in("dlktdr", DLKTDR),
+    "elrs": serial_stand_in("elrs", ELRS, "?span=80"),
     "file": file_stand_in,
     "freepie": udp_stand_in("freepie", FREEPIE),
+    "hatire": serial_stand_in("hatire", HATIRE),
     "opentrack": udp_stand_in("opentrack", OPENTRACK),
     "osc": udp_stand_in("osc", OSC),
     "script": script_stand_in,

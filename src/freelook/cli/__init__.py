@@ -34,6 +34,7 @@ EXTRA_OF = {
     "numba": "render",
     "playwright": "bench",
     "rich": "cli",
+    "serial": "serial",
 }
 
 
