@@ -50,13 +50,10 @@ def drawing(picture: Picture, circle: ImageCircle, camera: Camera) -> NDArray[np
 
 
 def write_drawing(path: Path, drawn: NDArray[np.uint8]) -> None:
-    """Encode by the file's suffix; FreelookError where that is no picture's."""
-    try:
-        done, data = cv2.imencode(path.suffix or ".", drawn)
-    except cv2.error:
-        done = False
+    """Encode by the file's suffix, which must be a picture's; FreelookError if that fails."""
+    done, data = cv2.imencode(path.suffix, drawn)
     if not done:
-        raise FreelookError(f"{path}: not the name of a picture that can be written; try .png")
+        raise FreelookError(f"{path}: OpenCV cannot write this kind of picture")
     try:
         path.write_bytes(data.tobytes())
     except OSError as error:

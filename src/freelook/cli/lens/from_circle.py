@@ -16,6 +16,7 @@ along the edge of the image. A moving camera in daylight is best; one picture ma
 from __future__ import annotations
 
 import argparse
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -69,6 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     from ...calibration.circle import camera_from_circle, find_circle, unit_radius
+    from ...media.pictures import is_picture
     from ...sinks import check_output_file
     from .._circles import look_at
     from ._circle_drawing import drawing, write_drawing
@@ -80,6 +82,8 @@ def run(args: argparse.Namespace) -> int:
         raise FreelookError(f"--frames must be 1 or more, not {args.frames}")
     out = Path(args.output or f"{Path(args.inputs[0]).stem}.lens.json")
     drawn = Path(args.draw) if args.draw else out.with_suffix(".png")
+    if not is_picture(str(drawn)):
+        raise FreelookError(f"{drawn}: not the name of a picture that can be written; try .png")
     for path in (out, drawn):
         check_output_file(str(path), overwrite=args.overwrite)
     looked = look_at(args.inputs, args.frames, quiet=args.json)
@@ -164,4 +168,4 @@ def _print(facts: dict[str, Any]) -> None:
     scale = f"{axis:.2f}" if abs(axis - rim) < 0.005 else f"{axis:.2f} (at the rim {rim:.2f})"
     print(f"  lens    {facts['model']}, {facts['fov_deg']:g} degrees: {scale} pixels per degree")
     print(f"wrote {facts['profile']}, and what was found: {facts['drawing']}")
-    print(f"use it: freelook fly SOURCE --lens {facts['profile']}")
+    print(f"use it: freelook fly SOURCE --lens {shlex.quote(facts['profile'])}")
