@@ -15,18 +15,29 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from ..camera import Camera
 from ..errors import CalibrationError, ProfileError
 from ..lens import Floats
+from .equations import Equations, Problem, State
 from .parameters import Freedom, Parameters
 from .slopes import cross_matrices, point_slopes, project, value_slopes
 from .views import Pose, View
+
+__all__ = [
+    "Adjusted",
+    "Problem",
+    "Solution",
+    "State",
+    "adjusted",
+    "resect",
+    "resect_all",
+    "rms",
+    "solve",
+]
 
 Bools = NDArray[np.bool_]
 
@@ -45,10 +56,12 @@ class Solution:
     poses       the target's, one for each view
     residuals   (n, 2) for each view: seen minus projected, pixels
     inliers     (n,) for each view: the points that count
-    covariance  (k, k) of the free values (see `parameters`); the noise taken from the residuals
+    covariance  (k, k) of the free values (see `parameters`), from the residuals
     names       of those
     condition   of the scaled normal equations of the camera alone; above 1e14 they say nothing
     noise_px    standard deviation of a coordinate, from the points that count
+    together    how many times as far the views disagree on the camera as independent errors would
+                make them (1: not at all); the covariance takes it in
     """
 
     camera: Camera
@@ -59,6 +72,7 @@ class Solution:
     names: tuple[str, ...]
     condition: float
     noise_px: float
+    together: float
 
     @property
     def rms_px(self) -> float:
@@ -135,49 +149,6 @@ def resect_all(
 
 
 KNOWN = Freedom(lens=False, center=False, aspect=False)
-
-
-@dataclass(frozen=True)
-class State:
-    """Values (k,), and of every pose the rotation matrix (views, 3, 3) and shift (views, 3)."""
-
-    values: Floats
-    turns: Floats
-    shifts: Floats
-
-    @classmethod
-    def of(cls, values: Floats, poses: Sequence[Pose]) -> State:
-        turns = np.stack([pose.camera_from_target.as_matrix() for pose in poses])
-        return cls(values, turns, np.stack([pose.translation for pose in poses]))
-
-    @property
-    def poses(self) -> tuple[Pose, ...]:
-        rotations = Rotation.from_matrix(self.turns)
-        return tuple(Pose(rotations[i], shift) for i, shift in enumerate(self.shifts))
-
-    def moved(self, step: tuple[Floats, Floats]) -> State:
-        """By (values, (views, 6): rotation vector, shift)."""
-        values, moves = step
-        turns = Rotation.from_rotvec(moves[:, :3]).as_matrix() @ self.turns
-        return State(self.values + values, turns, self.shifts + moves[:, 3:])
-
-
-class Problem(Protocol):
-    """What is minimised: `count` points in `parts`, each of which has its own pose.
-
-    How values and poses become pixels is the problem's own affair: one camera, or two on a rig.
-    """
-
-    count: int
-    parts: list[slice]
-
-    def residuals(self, state: State) -> Floats:
-        """(count, 2): seen minus projected, pixels."""
-        ...
-
-    def slopes(self, state: State) -> tuple[Floats, Floats]:
-        """d pixel / d values (n, 2, k) and d pixel / d (rotation vector, shift) (n, 2, 6)."""
-        ...
 
 
 class _Problem:
@@ -284,7 +255,7 @@ def _minimise(
     for _ in range(steps):
         weights = weights_of(residuals)
         cost = float(weights @ _squares(residuals))
-        equations = _Equations.of(problem, state, residuals, weights)
+        equations = Equations.of(problem, state, residuals, weights)
         if not equations.sound:
             return state
         while True:
@@ -316,80 +287,6 @@ def _tried(
 
 
 @dataclass(frozen=True)
-class _Equations:
-    """The normal equations in blocks: camera, poses, and between them."""
-
-    camera: Floats  # (k, k)
-    between: Floats  # (views, k, 6)
-    poses: Floats  # (views, 6, 6)
-    camera_right: Floats  # (k,)
-    poses_right: Floats  # (views, 6)
-
-    @classmethod
-    def of(cls, problem: Problem, state: State, residuals: Floats, weights: Floats) -> _Equations:
-        """`weights` (n,); the poses of views that count for nothing stay where they are."""
-        by_camera, by_pose = problem.slopes(state)
-        k = by_camera.shape[-1]
-        root = np.sqrt(weights)
-        rows = np.concatenate([by_camera, by_pose, residuals[:, :, None]], axis=-1)
-        rows = (rows * root[:, None, None]).reshape(2 * problem.count, k + 7)
-        products = np.stack([_square(rows[2 * p.start : 2 * p.stop]) for p in problem.parts])
-        poses = products[:, k:-1, k:-1]
-        poses[~poses.any(axis=(1, 2))] = np.eye(6)
-        return cls(
-            products[:, :k, :k].sum(0),
-            products[:, :k, k:-1],
-            poses,
-            products[:, :k, -1].sum(0),
-            products[:, k:-1, -1],
-        )
-
-    @property
-    def sound(self) -> bool:
-        """Whether all of it are numbers: near the end of a formula some are not."""
-        parts = (self.camera, self.between, self.poses, self.camera_right, self.poses_right)
-        return all(bool(np.isfinite(part).all()) for part in parts)
-
-    def step(self, damping: float) -> tuple[Floats, Floats] | None:
-        """(camera values, pose changes (views, 6)), or None where the equations say nothing."""
-        poses = self.poses + _diagonal(self.poses, damping)
-        camera = self.camera + _diagonal(self.camera, damping)
-        try:
-            inverse = np.linalg.inv(poses)
-            through = self.between @ inverse
-            left = camera - (through @ self.between.swapaxes(1, 2)).sum(0)
-            right = self.camera_right - (through @ self.poses_right[:, :, None]).sum(0)[:, 0]
-            values = _scaled_solve(left, right)
-        except np.linalg.LinAlgError:
-            return None
-        back = self.poses_right - values @ self.between
-        return values, (inverse @ back[:, :, None])[:, :, 0]
-
-    def information(self) -> Floats:
-        """(k, k) of the camera alone, the poses eliminated."""
-        through = self.between @ np.linalg.inv(self.poses)
-        return np.asarray(self.camera - (through @ self.between.swapaxes(1, 2)).sum(0))
-
-
-def _square(rows: Floats) -> Floats:
-    return np.asarray(rows.T @ rows)
-
-
-def _diagonal(blocks: Floats, damping: float) -> Floats:
-    size = blocks.shape[-1]
-    own = np.einsum("...ii->...i", blocks)
-    return np.asarray(np.eye(size) * (damping * own + 1e-30)[..., None, :])
-
-
-def _scaled_solve(left: Floats, right: Floats) -> Floats:
-    """Pixels and k4 differ by ten orders of magnitude: solve with a unit diagonal."""
-    if not len(left):
-        return np.zeros(0)
-    scale = 1 / np.sqrt(np.maximum(np.diag(left), 1e-300))
-    return np.asarray(scale * np.linalg.solve(left * np.outer(scale, scale), right * scale))
-
-
-@dataclass(frozen=True)
 class Adjusted:
     """A problem solved: see `Solution`. `residuals` (n, 2), `counted` (n,), of all points."""
 
@@ -399,6 +296,7 @@ class Adjusted:
     covariance: Floats
     condition: float
     noise_px: float
+    together: float
 
 
 def adjusted(problem: Problem, state: State) -> Adjusted:
@@ -409,16 +307,16 @@ def adjusted(problem: Problem, state: State) -> Adjusted:
 
 def _known(problem: Problem, state: State, counted: Floats) -> Adjusted:
     residuals = problem.residuals(state)
-    equations = _Equations.of(problem, state, residuals, counted)
+    equations = Equations.of(problem, state, residuals, counted)
     if not (equations.sound and np.isfinite(residuals).all()):
         raise CalibrationError(UNDETERMINED)
     try:
-        information = equations.information()
+        each, right = equations.eliminated()
     except np.linalg.LinAlgError:
         raise CalibrationError(UNDETERMINED) from None
-    scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
-    unit = information * np.outer(scale, scale)
-    condition = float(np.linalg.cond(unit)) if len(unit) else 1.0
+    scale = 1 / np.sqrt(np.maximum(np.diag(each.sum(0)), 1e-300))
+    each = each * np.outer(scale, scale)
+    condition = float(np.linalg.cond(each.sum(0))) if len(scale) else 1.0
     if not condition < WORST_CONDITION:
         raise CalibrationError(UNDETERMINED)
     used = sum(bool(counted[part].any()) for part in problem.parts)
@@ -429,8 +327,30 @@ def _known(problem: Problem, state: State, counted: Floats) -> Adjusted:
             f"{int(counted.sum())} points are too few for {unknowns} unknowns; add views"
         )
     variance = float(counted @ _squares(residuals)) / surplus
-    covariance = variance * np.linalg.inv(unit) * np.outer(scale, scale)
-    return Adjusted(state, residuals, counted > 0, covariance, condition, float(np.sqrt(variance)))
+    inverse = np.linalg.inv(each.sum(0))
+    together = _together(inverse, each, right * scale, variance)
+    covariance = together**2 * variance * inverse * np.outer(scale, scale)
+    noise = float(np.sqrt(variance))
+    return Adjusted(state, residuals, counted > 0, covariance, condition, noise, together)
+
+
+def _together(inverse: Floats, each: Floats, right: Floats, variance: float) -> float:
+    """How many times as far the parts disagree on the values as independent errors would make
+    them; at least 1.
+
+    The errors of neighbouring corners go together where a board is not flat, a picture was taken
+    in motion or light spills, and then many corners say no more than a few. Were they independent,
+    the squared right sides of the parts, weighed by the inverse information L, would sum to
+
+        variance * sum over parts of trace(L I) - trace(L I L I)
+
+    (their sum being 0, as at the minimum). The ratio to that is the design effect of cluster
+    samples (Kish, "Survey Sampling", 1965), one number for all values.
+    """
+    shares = inverse @ each
+    own = np.trace(shares, axis1=1, axis2=2).sum() - np.einsum("vij,vji->", shares, shares)
+    seen = np.einsum("vi,ij,vj->", right, inverse, right)
+    return float(np.sqrt(max(1.0, seen / (variance * own)))) if variance * own > 1e-9 else 1.0
 
 
 def _solution(problem: _Problem, state: State, weights: Floats) -> Solution:
@@ -444,6 +364,7 @@ def _solution(problem: _Problem, state: State, weights: Floats) -> Solution:
         problem.parameters.names,
         known.condition,
         known.noise_px,
+        known.together,
     )
 
 

@@ -22,6 +22,8 @@ from .initial import Guess, first_guesses, mirrored, pose_of
 from .parameters import Freedom
 from .views import Pose, View, checked
 
+__all__ = ["Calibration", "Candidate", "Progress", "calibrate"]
+
 RACE_POINTS, RACE_STEPS = 40, 8  # of each view, to tell the guesses apart
 STRAY = 0.5  # a view counts if so many of its points do
 POOR_VIEW = 2.0  # times the usual median distance
