@@ -14,7 +14,7 @@ from ._progress import StatusLine
 from .fly import add_serving_arguments, announce, never, opened_door, source_kinds
 
 if TYPE_CHECKING:  # the web libraries are slow to load, and may be missing
-    from ..web.calibration_station import CalibrationStation, Result
+    from ..web.calibration_station import CalibrationStation, Result, Saved
 
 
 def add_live_arguments(parser: argparse.ArgumentParser) -> None:
@@ -74,27 +74,29 @@ def _check(args: argparse.Namespace) -> None:
             raise FreelookError(f"{path}: there is no folder to write it to")
 
 
-def save(args: argparse.Namespace, result: Result) -> tuple[str, str]:
-    """The profile, and where it and the report went. FreelookError: it could not be written."""
-    text = profile_text(args.name, result.calibration)
-    if args.report:
-        from ..report.calibration import calibration_page
+def save(args: argparse.Namespace, result: Result) -> Saved:
+    """Write the profile and the report, as far as they were asked for."""
+    from ..web.calibration_station import Saved
 
-        title = f"Calibration of {args.name}" if args.name else "Lens calibration"
-        page = calibration_page(result.calibration, result.pictures, title)
-        _write(args.report, page)
+    profile = profile_text(args.name, result.calibration)
     if not args.output:
-        return text, "not saved at the station: no -o FILE was given"
-    _write(args.output, text)
-    written = " and ".join(str(Path(p).resolve()) for p in (args.output, args.report) if p)
-    return text, f"saved as {written}"
-
-
-def _write(path: str, text: str) -> None:
+        return Saved(profile, "not saved here: no -o FILE was given", False)
     try:
-        Path(path).write_text(text, "utf-8")
+        Path(args.output).write_text(profile, "utf-8")
+        where = f"saved as {Path(args.output).resolve()}"
+        if args.report:
+            Path(args.report).write_text(_report(args.name, result), "utf-8")
+            where += f", report: {Path(args.report).resolve()}"
     except OSError as error:
-        raise FreelookError(f"{path} cannot be written: {error.strerror}") from None
+        return Saved(profile, f"not saved: {error.filename}: {error.strerror}", False)
+    return Saved(profile, where, True)
+
+
+def _report(name: str, result: Result) -> str:
+    from ..report.calibration import calibration_page
+
+    title = f"Calibration of {name}" if name else "Lens calibration"
+    return calibration_page(result.calibration, result.pictures, title)
 
 
 def summary(station: CalibrationStation) -> str:

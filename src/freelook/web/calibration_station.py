@@ -42,25 +42,29 @@ LOOKED_ON_NS = 2 * NS_PER_S  # a page that has not asked for so long is gone
 
 @dataclass(frozen=True)
 class Result:
-    """A finished calibration: what the page and the saver need.
-
-    pictures  of the views, by name, where they were asked for
-    """
+    """A finished calibration, and the views' pictures by name, if they were asked for."""
 
     calibration: Calibration
     progress: Progress
-    source: str
     pictures: dict[str, Gray]
 
 
 @dataclass(frozen=True)
+class Saved:
+    """The profile's text, and in words where it was written to, or why it was not."""
+
+    profile: str
+    where: str
+    done: bool
+
+
+@dataclass(frozen=True)
 class Plan:
-    """What is calibrated and how. `save` is called with the result on a thread of its own: it
-    returns the profile's text and, in words, where it went; FreelookError says why it did not."""
+    """What is calibrated and how; `save` is called with the result, on the solving thread."""
 
     source: str
     target: Target
-    save: Callable[[Result], tuple[str, str]]
+    save: Callable[[Result], Saved]
     model: str = "auto"
     freedom: Freedom = field(default_factory=Freedom)
     keep_pictures: bool = False
@@ -303,24 +307,19 @@ class CalibrationStation:
         calibration, progress = solve_views(job.views, job.size, model, freedom, say=self._say)
         if not job.final:
             return partial(self._came_out, job, calibration, progress)
-        result = Result(calibration, progress, self._plan.source, dict(self._pictures))
+        result = Result(calibration, progress, dict(self._pictures))
         return partial(self._finished, job, self._saved(result))
 
     def _say(self, what: str) -> None:
         self._solving = what
 
     def _saved(self, result: Result) -> dict[str, Any]:
-        try:
-            profile, where = self._plan.save(result)
-            saved = True
-        except FreelookError as error:
-            profile, where, saved = "", str(error), False
-        number = 1 + (self.result["number"] if self.result else 0)
+        saved = self._plan.save(result)
         return {
-            "number": number,
-            "saved": saved,
-            "where": where,
-            "profile": profile,
+            "number": 1 + (self.result["number"] if self.result else 0),
+            "saved": saved.done,
+            "where": saved.where,
+            "profile": saved.profile,
             "sentences": sentences(result.calibration),
             "model": result.calibration.model,
             "camera": camera_table(result.calibration.camera),

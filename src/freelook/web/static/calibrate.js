@@ -43,7 +43,7 @@ export class Page {
       button.addEventListener('click', () => this.act(button.dataset.action));
     }
     addEventListener('keydown', (event) => this.press(event));
-    new ResizeObserver(() => this.draw()).observe(byId('scene'));
+    new ResizeObserver(() => this.resized()).observe(byId('scene'));
     getJson('api/calibration').then(({ source }) => write(byId('source-name'), source)).catch(() => {});
     this.feed.run();
   }
@@ -103,7 +103,7 @@ export class Page {
     const hold = byId('hold');
     hold.classList.toggle('enough', look?.enough ?? false);
     write(hold, phase === 'finishing' ? `Solving: ${solving}` : this.sided(next(look)));
-    const trouble = message || look?.trouble || '';
+    const trouble = message || (look?.trouble ? `Not solved yet: ${look.trouble}` : '');
     byId('message').hidden = !trouble;
     write(byId('message'), trouble);
     write(byId('solving'), solving && phase === 'taking' ? 'solving' : '');
@@ -139,7 +139,11 @@ export class Page {
     if (!news?.look) return;
     drawCamera(byId('camera'), picture, news.look, news.phase === 'taking');
     if (news.phase !== 'done') drawMap(byId('map'), news.look);
-    else this.view.draw();
+  }
+
+  resized() {
+    this.draw();
+    this.view.draw();
   }
 
   /** @param {number | null} number */
