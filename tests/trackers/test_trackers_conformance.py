@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given
@@ -21,7 +22,7 @@ from freelook.axes import AXES
 from freelook.clock import now_ns
 from freelook.errors import TrackerError
 from freelook.rotations import head_angles_deg
-from freelook.trackers import known_trackers, open_tracker
+from freelook.trackers import joystick, known_trackers, open_tracker
 from freelook.trackers.elrs import crc8_dvb_s2
 from freelook.types import Pose, Tracker
 from serial_device import SerialDevice
@@ -74,6 +75,17 @@ ELRS += bytes([crc8_dvb_s2(ELRS[3:])])
 DLKTDR = b'\x02{"panoff":30,"tiltoff":20,"rolloff":10,"Cmd":"Data"}AB\x03\r\n'
 
 
+def joystick_stand_in(tmp_path: Path) -> StandIn:
+    """What the kernel would say: values from -900 to 900, at tenths of degrees."""
+    angles = dict(enumerate((300, 200, 100)))
+    info = {number: SimpleNamespace(value=v, min=-900, max=900) for number, v in angles.items()}
+    device = SimpleNamespace(absinfo=info.get, close=lambda: None)
+    patch = pytest.MonkeyPatch()
+    patch.setattr(joystick, "open_device", lambda wanted: device)
+    PLUGGED_IN.callback(patch.undo)
+    return "joystick:made up", feed_nothing
+
+
 @pytest.fixture(autouse=True)
 def _unplug() -> Iterator[None]:
     yield
@@ -97,6 +109,7 @@ STAND_INS: dict[str, Callable[[Path], StandIn]] = {
     "file": file_stand_in,
     "freepie": udp_stand_in("freepie", FREEPIE),
     "hatire": serial_stand_in("hatire", HATIRE),
+    "joystick": joystick_stand_in,
     "opentrack": udp_stand_in("opentrack", OPENTRACK),
     "osc": udp_stand_in("osc", OSC),
     "script": script_stand_in,
