@@ -248,7 +248,6 @@ def with_few_points(made: list[Moment]) -> list[Moment]:
             "no moment shows the target in both",
         ),
         (shuffled, "pairs agree on how the cameras stand"),
-        (with_few_points, "right camera: 03: 5 points; a view needs at least 6"),
     ],
 )
 def test_what_cannot_be_calibrated_is_said(
@@ -256,6 +255,13 @@ def test_what_cannot_be_calibrated_is_said(
 ) -> None:
     with pytest.raises(CalibrationError, match=said):
         solved(change(moments(5, missing=0.0)))
+
+
+def test_a_view_with_too_few_points_is_left_out_and_said() -> None:
+    stereo = solved(with_few_points(moments(5, missing=0.0)))
+    assert stereo.dropped == (("03", "5 points; a view needs at least 6"),)
+    assert stereo.pairs + stereo.singles == len(moments(5, missing=0.0))
+    assert stereo.singles == 1
 
 
 def sight(pose: Pose, rng: np.random.Generator, keep: slice = slice(None)) -> Sight:
