@@ -35,9 +35,10 @@ from freelook.types import ColorSpace
 Pictures = NDArray[np.uint8]
 Floats = NDArray[np.float64]
 
-# What is asked of the finder. On these pictures, whose rims are sharp or blurred by known amounts,
-# most cases are within a tenth of it; what must hold is what a user is told.
-CENTER_PX, RADIUS_PX = 2.0, 3.0
+CENTER_PX, RADIUS_PX = 2.0, 3.0  # asked of the finder wherever the truth is known
+# On simulated pictures, whose rims are sharp or evenly blurred, it is better: measured over 124 of
+# them, at most 0.10 and 0.47.
+SIMULATED_CENTER_PX, SIMULATED_RADIUS_PX = 0.3, 0.9
 FIELD_DEG = 188.0
 
 
@@ -72,9 +73,9 @@ CAMERAS = {
 def assert_found(found: ImageCircle, truth: Camera, shift: tuple[float, float] = (0, 0)) -> None:
     rim = float(truth.lens.radius(np.array([truth.theta_max]))[0])
     off = np.subtract(found.center, truth.center) + shift
-    assert np.hypot(*off) < CENTER_PX
-    assert abs(found.radius_px - rim) < RADIUS_PX
-    assert abs(found.radius_px * found.aspect - rim * truth.stretch[1, 1]) < RADIUS_PX
+    assert np.hypot(*off) < SIMULATED_CENTER_PX
+    assert abs(found.radius_px - rim) < SIMULATED_RADIUS_PX
+    assert abs(found.radius_px * found.aspect - rim * truth.stretch[1, 1]) < SIMULATED_RADIUS_PX
 
 
 def as_luma(levels: NDArray[Any]) -> Pictures:

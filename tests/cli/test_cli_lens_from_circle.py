@@ -14,9 +14,11 @@ import numpy as np
 import pytest
 
 from freelook import sources
+from freelook.calibration.circle import one_parameter_models
 from freelook.camera import Camera
 from freelook.cli import _circles, fly, main
 from freelook.cli._circles import look_at
+from freelook.cli.lens import from_circle
 from freelook.errors import FreelookError, SourceError
 from freelook.formats import load_camera, load_profile
 from freelook.media.pictures import read_picture
@@ -168,6 +170,10 @@ def test_mistakes_are_explained(
     for name in ("there.json", "there.png"):
         assert Path(name).read_text() == "precious, and no video"
     assert not Path("a flight.lens.json").exists()
+
+
+def test_models_offered_are_those_that_a_circle_determines() -> None:
+    assert sorted(from_circle.MODELS) == sorted(one_parameter_models())
 
 
 def test_unknown_models_are_listed(flight: Path, capsys: pytest.CaptureFixture[str]) -> None:
