@@ -14,6 +14,7 @@ from ._progress import StatusLine
 from .fly import add_serving_arguments, announce, never, opened_door, source_kinds
 
 if TYPE_CHECKING:  # the web libraries are slow to load, and may be missing
+    from ..calibration.targets import Target
     from ..web.calibration_station import CalibrationStation, Result, Saved
 
 
@@ -28,10 +29,9 @@ def add_live_arguments(parser: argparse.ArgumentParser) -> None:
     add_serving_arguments(group)
 
 
-def run_live(args: argparse.Namespace) -> int:
+def run_live(args: argparse.Namespace, target: Target) -> int:
     """Serve the page until Ctrl-C."""
     from ..calibration.parameters import Freedom
-    from ..calibration.targets import Chessboard
     from ..ingest import Ingest
     from ..sources import open_source
     from ..web.calibration_server import make_calibration_app
@@ -41,7 +41,7 @@ def run_live(args: argparse.Namespace) -> int:
     _check(args)
     plan = Plan(
         args.live,
-        Chessboard(args.square, args.board),
+        target,
         lambda result: save(args, result),
         args.model,
         Freedom(aspect=not args.square_pixels, skew=args.skew),

@@ -29,6 +29,7 @@ from ._profile_text import profile_text
 
 if TYPE_CHECKING:
     from ..calibration.calibrate import Calibration
+    from ..calibration.targets import Target
     from ._target_views import Found
 
 
@@ -58,22 +59,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    from ..calibration.targets import Chessboard
+
     for path in (args.output, args.report):
         if path and Path(path).exists() and not args.overwrite:
             raise FreelookError(f"{path} exists; --overwrite replaces it")
-    return run_live(args) if args.live else _run(args)
+    target = Chessboard(args.square, args.board)
+    return run_live(args, target) if args.live else _run(args, target)
 
 
-def _run(args: argparse.Namespace) -> int:
+def _run(args: argparse.Namespace, target: Target) -> int:
     from ..calibration.calibrate import calibrate
     from ..calibration.parameters import Freedom
-    from ..calibration.targets import Chessboard
     from ..calibration.words import figures
     from ._target_views import find_views
 
     if not args.inputs:
         raise CalibrationError("give pictures, videos or corner files, or --live SOURCE")
-    found = find_views(args.inputs, Chessboard(args.square, args.board), quiet=args.json)
+    found = find_views(args.inputs, target, quiet=args.json)
     if not found.views:
         raise CalibrationError(_nothing_found(found))
     assert found.size is not None

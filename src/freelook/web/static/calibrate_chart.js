@@ -8,6 +8,7 @@ const LINES = /** @type {const} */ ([
   ['sure', 'uncertainty_px'], ['left-out', 'left_out_px'], ['rms', 'rms_px'],
 ]);
 const ROUND = [1, 2, 5];
+const MOST_LABELS = 6; // with more ticks only powers of ten are labelled
 const LEAST_RANGE = 4; // from the lowest to the highest tick
 
 /** @param {string} name @param {Record<string, string | number>} attributes @param {string} [text] */
@@ -60,7 +61,8 @@ function axes(marks, first, last, x, y) {
   for (const mark of marks) {
     const at = y(mark);
     made.push(element('line', { class: 'grid', x1: BOX.left, x2: BOX.right, y1: at, y2: at }));
-    const label = String(Number(mark.toPrecision(2)));
+    const round = Math.abs(Math.log10(mark) % 1) < 1e-6;
+    const label = round || marks.length <= MOST_LABELS ? String(Number(mark.toPrecision(2))) : '';
     made.push(element('text', { x: BOX.left - 5, y: at + 3.5, 'text-anchor': 'end' }, label));
   }
   for (const views of [first, last]) {
