@@ -74,11 +74,6 @@ def best_circles(
     return normal, _distances(rays, normal[points.line_of])
 
 
-def normals(camera: Camera, points: LinePoints, straggling_px: float) -> Floats:
-    """Only the normals of `best_circles`."""
-    return best_circles(camera, points, straggling_px)[0]
-
-
 def _normals(rays: _Rays, points: LinePoints, straggling_px: float, along: Floats | None) -> Floats:
     outer = rays.ray[:, :, None] * rays.ray[:, None, :]
     weight = np.ones(len(outer))

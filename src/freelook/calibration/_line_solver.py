@@ -21,7 +21,11 @@ SLOPES_AT = 6  # angles at which that is said
 CENTER_SIGMA = 0.01  # of the circle's radius
 RADIUS_SIGMA = 0.001  # of the radius, where its error is not told
 FIRST_NOISE_PX, LEAST_NOISE_PX = 2.0, 0.05
-WEIGHINGS = 3
+WEIGHINGS = 5
+TRUSTING = 2  # so many times all points count, and each: a lens still far off bends whole lines
+STRAY = 5.0  # times the noise: such a point does not count
+
+Distances = Callable[[Floats], Floats]
 
 
 def as_kannala_brandt(camera: Camera, terms: int = MOST_TERMS) -> Camera:
@@ -72,31 +76,39 @@ class LineProblem:
     radius_error_px: float
     center_error_px: float
 
-    def solved(self, lines: Sequence[Line]) -> Found:
+    def solved(self, lines: Sequence[Line], near: Camera | None = None) -> Found:
         """The best values; the noise, and how much points of a line err as one, as found.
 
-        Both are needed to weigh lines against what is assumed, so it is done a few times.
+        Both are needed to weigh lines against what is assumed, so it is done a few times. `near`
+        is a Kannala-Brandt camera to begin at, of the same field; only to save time.
         """
-        start = as_kannala_brandt(self.told, self.terms)
+        start = near or as_kannala_brandt(self.told, self.terms)
         points, triads = LinePoints.of(lines), Triads.of(start, lines)
         values = np.concatenate([self._values_of(start), np.zeros(3 * len(triads.first_guess))])
-        noise, together = FIRST_NOISE_PX, 1.0
-        for _ in range(WEIGHINGS):
+        noise, together, counts = FIRST_NOISE_PX, 1.0, np.ones(len(points.pixels))
+        for number in range(WEIGHINGS):
             scale, straggling = noise * np.sqrt(together), 3 * noise
 
-            def off(values: Floats, straggling: float = straggling) -> Floats:
+            def off(
+                values: Floats, straggling: float = straggling, counts: Floats = counts
+            ) -> Floats:
                 along = triads.along(values[self.terms + 3 :] / self._rim_px)
-                return best_circles(self.camera(values), points, straggling, along)[1]
+                return counts * best_circles(self.camera(values), points, straggling, along)[1]
 
-            def rows(values: Floats, scale: float = scale) -> Floats:
+            def rows(values: Floats, scale: float = scale, off: Distances = off) -> Floats:
                 return np.concatenate([_softened(off(values) / scale), self._assumed(values)])
 
-            solution = least_squares(rows, values, x_scale="jac", xtol=1e-6, ftol=1e-6, max_nfev=50)
+            near_enough = 1e-6 if number == WEIGHINGS - 1 else 1e-4
+            solution = least_squares(
+                rows, values, x_scale="jac", xtol=near_enough, ftol=near_enough, max_nfev=40
+            )
             values = np.asarray(solution.x)
-            left = off(values)
+            left = off(values, counts=np.ones(len(counts)))
             noise = _noise(left, len(left) - 2 * len(lines) - len(values))
-            slopes = _differences(off, values)
-            together = _together(slopes, left, points, noise)
+            if number >= TRUSTING:
+                counts = (np.abs(left) < STRAY * noise).astype(float)
+                slopes = _differences(off, values)
+                together = _together(slopes, counts * left, points, noise)
         spread = self._spread(values, slopes / (noise * np.sqrt(together)))
         by_values = _differences(self._parameters, values)
         covariance = np.asarray(by_values @ spread @ by_values.T)

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from ..camera import Camera
 from ..errors import CalibrationError
 from ..lens import Floats, KannalaBrandt, growth_limit, radius_slope, vector
-from ._great_circles import Line, LinePoints, best_circles, normals
+from ._great_circles import Line, LinePoints, best_circles
 from ._line_solver import (
     CENTER_SIGMA,
     MOST_TERMS,
@@ -49,6 +49,7 @@ FIELD_ERROR_DEG = 1.0
 RIM_WITHIN = 1.5  # of the field: farther out the rim is not looked for
 WORST_LINE = 3.0  # times the median of all lines' RMS is no straight line
 LEAST_WORST_PX = 0.5
+STRAY, LEAST_STRAY_PX = 10.0, 3.0  # times the median of its line, and pixels: a wrong click
 ROUNDS = 6
 
 Bools = NDArray[np.bool_]
@@ -70,7 +71,8 @@ class LineFit:
     """A camera under which lines are straight, and what is known about it. Less sure than a board.
 
     start, camera      before and after; the same size, field and aspect
-    lines, kept        all lines, and (n,) which of them counted
+    lines, kept        all lines, without points that are clearly wrong, and (n,) which of them
+                       counted
     before, after      distances of each line's points from its great circle, pixels, signed
     covariance         (k, k) of f, k1 to k4, center x, y, with everything that was assumed but
                        the errors of what was told; terms that were not sought have zeros
@@ -147,7 +149,7 @@ def refine(
     """
     if not 1 <= terms <= MOST_TERMS:
         raise CalibrationError(f"1 to {MOST_TERMS} terms can be sought, not {terms}")
-    usable = _checked(lines)
+    usable = _without_strays(camera, _checked(lines))
     check_telling(as_kannala_brandt(camera), usable)
     problem = _problem(camera, terms, field_error_deg, radius_error_px, center_error_px)
     found, kept = _solved(problem, usable)
@@ -157,7 +159,9 @@ def refine(
     rim = rim_sigma = float("nan")
     if ask_rim:
         counted = [line for line, k in zip(usable, kept, strict=True) if k]
-        rim, rim_sigma = _rim(camera, replace(problem, radius_error_px=1e6).solved(counted))
+        rim, rim_sigma = _rim(
+            camera, replace(problem, radius_error_px=1e6).solved(counted, found.camera)
+        )
     fitted = replace(found.camera, theta_max=half)
     return LineFit(
         camera,
@@ -196,8 +200,10 @@ def _problem(
 def _solved(problem: LineProblem, lines: Sequence[Line]) -> tuple[Found, Bools]:
     """With those lines that turn out straight, (n,)."""
     kept = np.ones(len(lines), dtype=bool)
+    near = None
     for _ in range(ROUNDS):
-        found = problem.solved([line for line, k in zip(lines, kept, strict=True) if k])
+        found = problem.solved([line for line, k in zip(lines, kept, strict=True) if k], near)
+        near = found.camera
         good = _straight_enough(line_distances(found.camera, lines))
         if good.sum() < FEWEST_LINES:
             raise CalibrationError(
@@ -234,6 +240,16 @@ def _checked(lines: Sequence[Line]) -> list[Line]:
     return list(lines)
 
 
+def _without_strays(camera: Camera, lines: Sequence[Line]) -> list[Line]:
+    """Without points that are far off where the rest of their line is nearly straight already."""
+    usable = []
+    for line, off in zip(lines, line_distances(camera, lines), strict=True):
+        near = np.abs(off) < max(STRAY * float(np.median(np.abs(off))), LEAST_STRAY_PX)
+        enough = near.sum() >= FEWEST_POINTS
+        usable.append(replace(line, pixels=line.pixels[near]) if enough else line)
+    return usable
+
+
 def _check_directions(lines: Sequence[Line]) -> None:
     """Of one picture: at most three, at least two, one of them told by two lines."""
     names = [line.along for line in lines]
@@ -252,12 +268,13 @@ def _check_directions(lines: Sequence[Line]) -> None:
 
 def check_telling(camera: Camera, lines: Sequence[Line]) -> None:
     """CalibrationError unless FEWEST_LINES of these lines would bend under another lens."""
-    telling = telling_px(camera, lines) > TELLING_PX
+    points = LinePoints.of(lines)
+    normal = best_circles(camera, points, LEAST_WORST_PX)[0]
+    aside = np.abs(normal[:, 2]) > np.sin(np.radians(THROUGH_CENTER_DEG))
+    telling = aside & (telling_px(camera, lines) > TELLING_PX)
     if telling.sum() >= FEWEST_LINES:
         return
-    points = LinePoints.of(lines)
-    off_deg = np.degrees(np.arcsin(np.abs(normals(camera, points, LEAST_WORST_PX)[:, 2])))
-    if (off_deg < THROUGH_CENTER_DEG).sum() > len(lines) - FEWEST_LINES:
+    if aside.sum() < FEWEST_LINES:
         raise CalibrationError(
             "the lines go through the middle of the picture, where they are straight under every "
             f"round lens: at least {FEWEST_LINES} long ones off the middle are needed, better near "
@@ -314,7 +331,7 @@ def _rim(told: Camera, found: Found) -> tuple[float, float]:
 def great_circles(camera: Camera, lines: Sequence[Line]) -> Iterator[Floats]:
     """For each line the pixels (n, 2) of its great circle where it is seen, between its ends."""
     points = LinePoints.of(lines)
-    for line, normal in zip(lines, normals(camera, points, LEAST_WORST_PX), strict=True):
+    for line, normal in zip(lines, best_circles(camera, points, LEAST_WORST_PX)[0], strict=True):
         rays = camera.ray(line.pixels)
         rays = rays[np.isfinite(rays[:, 2])]
         if not len(rays):
