@@ -31,13 +31,13 @@ WEAK_SHARE = 0.4  # of that continues one
 LEAST_STRONG = 12.0  # grey levels per pixel, times the Sobel mask's 4
 INSIDE = 0.96  # of the rim's radius: the rim itself is no straight line
 TURN = np.cos(np.radians(50))  # neighbours' gradients differ by no more
-STEP_PX = 6.0  # between the points of a line
+STEP_PX = 10.0  # between the points of a line
 SHORTEST = 0.14  # of the circle's radius
 STRAYS = (0.02, 0.01, 0.006)  # of a piece's length, round after round
 LEAST_STRAY_PX = 1.0
 GAP = 0.15  # of the radius, between pieces that are joined
 JOINED = 0.4  # of the share by which a piece may stray: joining must not bend
-MOST_LINES = 150
+MOST_LINES = 80
 FEWEST = 10  # pixels of a chain
 NEIGHBOURS = tuple(
     (r, c, float(np.hypot(r, c)))
