@@ -20,8 +20,9 @@ from freelook.ingest import Ingest
 from freelook.lens import KannalaBrandt
 from freelook.media.encoder import Encoder
 from freelook.types import Frame, Picture
+from freelook.web.calibration_plan import Plan, Result, Saved
 from freelook.web.calibration_server import make_calibration_app
-from freelook.web.calibration_station import CalibrationStation, Plan, Result, Saved
+from freelook.web.calibration_station import CalibrationStation
 from freelook.web.security import Guard
 
 FPS = 20

@@ -24,7 +24,7 @@ from freelook.formats import load_camera
 from freelook.sinks import open_sink
 from freelook.types import ColorSpace, Frame, Picture
 from freelook.web.calibration_picture import jpeg, luma
-from freelook.web.calibration_station import Result, Saved
+from freelook.web.calibration_plan import Result, Saved
 from freelook.web.security import Guard
 
 WaitUntil = Callable[..., None]

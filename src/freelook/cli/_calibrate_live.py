@@ -15,7 +15,8 @@ from .fly import add_serving_arguments, announce, never, opened_door, source_kin
 
 if TYPE_CHECKING:  # the web libraries are slow to load, and may be missing
     from ..calibration.targets import Target
-    from ..web.calibration_station import CalibrationStation, Result, Saved
+    from ..web.calibration_plan import Result, Saved
+    from ..web.calibration_station import CalibrationStation
 
 
 def add_live_arguments(parser: argparse.ArgumentParser) -> None:
@@ -34,8 +35,9 @@ def run_live(args: argparse.Namespace, target: Target) -> int:
     from ..calibration.parameters import Freedom
     from ..ingest import Ingest
     from ..sources import open_source
+    from ..web.calibration_plan import Plan
     from ..web.calibration_server import make_calibration_app
-    from ..web.calibration_station import CalibrationStation, Plan
+    from ..web.calibration_station import CalibrationStation
     from ..web.serving import serve
 
     _check(args)
@@ -58,6 +60,7 @@ def run_live(args: argparse.Namespace, target: Target) -> int:
             until=never,
         )
         asyncio.run(serving)
+        line.show(summary(station))  # what came since the last report
     return 0
 
 
@@ -76,7 +79,7 @@ def _check(args: argparse.Namespace) -> None:
 
 def save(args: argparse.Namespace, result: Result) -> Saved:
     """Write the profile and the report, as far as they were asked for."""
-    from ..web.calibration_station import Saved
+    from ..web.calibration_plan import Saved
 
     profile = profile_text(args.name, result.calibration)
     if not args.output:

@@ -11,15 +11,14 @@ import contextlib
 import queue
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 from .. import __version__
 from ..calibration.calibrate import Calibration
 from ..calibration.live import FIRST_SOLVE, LiveCalibration, LiveState, Progress, solve_views
-from ..calibration.parameters import Freedom
-from ..calibration.targets import Gray, Target
+from ..calibration.targets import Gray
 from ..calibration.views import View
 from ..calibration.words import sentences
 from ..clock import NS_PER_MS, NS_PER_S, Clock, now_ns
@@ -29,6 +28,7 @@ from ..mailbox import Mailbox
 from ..types import Counters, Frame
 from . import calibration_messages as messages
 from .calibration_picture import jpeg, luma
+from .calibration_plan import Plan, Result
 from .messages import camera_table, counts, source_status
 from .station import UnknownName
 
@@ -38,36 +38,6 @@ TICK_S = 0.25
 LONGEST_WAIT_S = 1.0
 SHOWN_EVERY_NS = 60 * NS_PER_MS  # pictures of the finished view
 LOOKED_ON_NS = 2 * NS_PER_S  # a page that has not asked for so long is gone
-
-
-@dataclass(frozen=True)
-class Result:
-    """A finished calibration, and the views' pictures by name, if they were asked for."""
-
-    calibration: Calibration
-    progress: Progress
-    pictures: dict[str, Gray]
-
-
-@dataclass(frozen=True)
-class Saved:
-    """The profile's text, and in words where it was written to, or why it was not."""
-
-    profile: str
-    where: str
-    done: bool
-
-
-@dataclass(frozen=True)
-class Plan:
-    """What is calibrated and how; `save` is called with the result, on the solving thread."""
-
-    source: str
-    target: Target
-    save: Callable[[Result], Saved]
-    model: str = "auto"
-    freedom: Freedom = field(default_factory=Freedom)
-    keep_pictures: bool = False
 
 
 @dataclass(frozen=True)
