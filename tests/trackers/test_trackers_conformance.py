@@ -72,6 +72,7 @@ PLUGGED_IN = ExitStack()
 HATIRE = struct.pack("<HH6fH", 0xAAAA, 1, 30, -10, 20, 0, 0, 0, 0x5555)
 ELRS = b"$X<\0\x83\x03\6\0" + struct.pack("<3H", *(992 + 10 * angle for angle in (30, 20, 10)))
 ELRS += bytes([crc8_dvb_s2(ELRS[3:])])
+IMU = b"0,0,0,0,0,1\n"  # still and level; it only can be told how it turns
 DLKTDR = b'\x02{"panoff":30,"tiltoff":20,"rolloff":10,"Cmd":"Data"}AB\x03\r\n'
 
 
@@ -109,6 +110,7 @@ STAND_INS: dict[str, Callable[[Path], StandIn]] = {
     "file": file_stand_in,
     "freepie": udp_stand_in("freepie", FREEPIE),
     "hatire": serial_stand_in("hatire", HATIRE),
+    "imu": serial_stand_in("imu", IMU),
     "joystick": joystick_stand_in,
     "opentrack": udp_stand_in("opentrack", OPENTRACK),
     "osc": udp_stand_in("osc", OSC),
@@ -118,7 +120,7 @@ STAND_INS: dict[str, Callable[[Path], StandIn]] = {
 
 
 FLOAT_DEG = 2e-5  # some speak in single precision
-TURNABLE = sorted(set(STAND_INS) - {"wander"})  # the others' heads are where they are told
+TURNABLE = sorted(set(STAND_INS) - {"wander", "imu"})  # the others' heads are where they are told
 
 
 @pytest.fixture(params=sorted(STAND_INS))

@@ -35,6 +35,10 @@ class Decoder(Protocol):
 
     counters: Counters
 
+    @property
+    def note(self) -> str:
+        """Why there is no pose although everything is well, or nothing."""
+
     def begin(self) -> bytes:
         """The port was just opened: forget everything; what to tell the device, if anything."""
 
@@ -47,6 +51,10 @@ class Decoder(Protocol):
 
 class QuietDecoder:
     """A decoder's `begin` and `reply` for devices that need not be told anything."""
+
+    @property
+    def note(self) -> str:
+        return ""
 
     def begin(self) -> bytes:
         return b""
@@ -97,6 +105,8 @@ class SerialTracker:
         connected = f"{self._name} is open at {self._baud} baud"
         if not self._heard:
             return f"{connected}, but it sends nothing"
+        if self._decoder.note:
+            return f"{connected}; {self._decoder.note}"
         if self._bytes_since_pose > SILLY_BYTES:
             return (
                 f"{connected}, but what it sends is not understood: is the baud rate right "

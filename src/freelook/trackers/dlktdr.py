@@ -68,7 +68,7 @@ def frame(command: str, **items: object) -> bytes:
 GREETING = frame("RD", **dict.fromkeys(ITEMS, True)) + frame("IH")
 
 
-class HeadTrackerDecoder:
+class HeadTrackerDecoder(_serial.QuietDecoder):
     """Frames to rotations. Counts `noise` bytes between frames, `invalid` frames, `other` ones, and
     how often the board `refused` what it was told."""
 
