@@ -223,7 +223,7 @@ class _Problem:
                 jac=slope,
                 method="SLSQP",
                 constraints={"type": "ineq", "fun": slack},
-                options={"maxiter": 300, "ftol": 1e-10 * max(cost(0 * x), 1e-12)},
+                options={"maxiter": 100, "ftol": 1e-10 * max(cost(0 * x), 1e-12)},
             )
         better = cost(found.x) < cost(0 * x) or slack(0 * x).min() < -1e-6
         feasible = bool(slack(found.x).min() > -1e-6)

@@ -12,7 +12,6 @@ from ..errors import FitError, ProfileError
 from ..lens import MODELS, Floats, Lens, OCamCalib, RadialSpline, growth_limit, vector, with_vector
 
 PLACES = 91
-FINE_KNOTS = 32
 RECTILINEAR = ("perspective", "poly3", "poly5", "ptlens", "opencv_rational")
 
 Bools = NDArray[np.bool_]
@@ -40,11 +39,11 @@ def default_lens(name: str, theta_max: float, knots: int) -> Lens:
     return model(1.0)  # type: ignore[call-arg]
 
 
-def fine_lens(name: str, theta_max: float) -> Lens:
+def fine_lens(name: str, theta_max: float, knots: int) -> Lens:
     """As `default_lens`, with as many knots or terms as help where there is no noise."""
     if name == "ocamcalib":
         return OCamCalib(1.0, (*OCamCalib.taylor, 0.0, 0.0, 0.0))
-    return default_lens(name, theta_max, FINE_KNOTS)
+    return default_lens(name, theta_max, knots)
 
 
 def scaled(lens: Lens, factor: float) -> Lens | None:

@@ -17,7 +17,7 @@ FEW = 3
 def starting_curves(
     model: str,
     data: CurveData,
-    fine: bool = False,
+    fine_knots: int | None = None,
     held: Sequence[str] = (),
 ) -> list[tuple[Lens, float]]:
     """A few simple lenses of a model, with offsets in pixels.
@@ -28,7 +28,7 @@ def starting_curves(
     """
     found = [
         start
-        for shape in _shapes(model, data, fine, held)
+        for shape in _shapes(model, data, fine_knots, held)
         if (start := _scaled(shape, data)) is not None
     ]
     if not found:
@@ -41,11 +41,11 @@ def starting_curves(
     return [(lens, offset) for _, lens, offset in kept]
 
 
-def _shapes(model: str, data: CurveData, fine: bool, held: Sequence[str]) -> list[Lens]:
+def _shapes(model: str, data: CurveData, fine_knots: int | None, held: Sequence[str]) -> list[Lens]:
     """Lenses of a model with scale 1: all defaults, then one parameter changed at a time."""
     plain = (
-        fine_lens(model, data.theta_max)
-        if fine
+        fine_lens(model, data.theta_max, fine_knots)
+        if fine_knots
         else default_lens(model, data.theta_max, knots_for(len(data.theta)))
     )
     x = vector(plain)

@@ -174,16 +174,16 @@ def fit_curve(
 
 
 def best_curve(
-    model: str, data: CurveData, *, fine: bool = False, held: Sequence[str] = ()
+    model: str, data: CurveData, *, fine_knots: int | None = None, held: Sequence[str] = ()
 ) -> tuple[CurveProblem, Minimum]:
     """The deepest minimum found, held to growing lenses if need be and if that helps.
 
-    fine  as many knots or terms as help where there is no noise
-    held  parameters that stay at their defaults
+    fine_knots  without noise: so many knots, or terms, of models that have as many as one likes
+    held        parameters that stay at their defaults
     """
     starts = [
         (CurveProblem.of(data, lens, held), offset)
-        for lens, offset in starting_curves(model, data, fine, held)
+        for lens, offset in starting_curves(model, data, fine_knots, held)
     ]
     p, n = len(starts[0][0].names), len(data.theta)
     if n <= p:

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..camera import Camera
 from ..errors import FitError
-from ..lens import MODELS, BentLens, Floats, Lens
+from ..lens import MODELS, BentLens, Floats, Lens, image_point
 from ..resolution import around_axis, inside_picture, places, ray_at, resolution_at, sample_places
 from ._camera_problem import STRETCHES, CameraProblem
 from ._cameras import fitted_camera
@@ -31,6 +31,8 @@ from .splined import refit_splined
 # seldom better than 0.3 pixels, and a straight edge bent by half a pixel still looks straight.
 LIMIT_SHARE = 0.5e-3
 COLUMNS_FIT, COLUMNS_CHECK = 36, 150
+# of a radial spline; of a bent lens it can only follow the mean, and many would follow the rest
+KNOTS, KNOTS_BENT = 32, 8
 HOPELESS = 0.02  # of the picture
 
 
@@ -188,11 +190,22 @@ def _is_hopeless(problem: CameraProblem, x: Floats) -> bool:
 def _start(camera: Camera, model: str, end: float, held: Sequence[str]) -> Lens:
     """The lens of the model whose radius is nearest, its centre and stretch left aside."""
     theta = np.linspace(0, end, 101)[1:]
-    data = checked(theta, camera.lens.radius(theta), None, False, "linear")
-    problem, found = best_curve(model, data, fine=True, held=held)
+    knots = KNOTS_BENT if isinstance(camera.lens, BentLens) else KNOTS
+    data = checked(theta, _mean_radius(camera.lens, theta), None, False, "linear")
+    problem, found = best_curve(model, data, fine_knots=knots, held=held)
     lens = problem.lens(found.x)
     assert lens is not None, "a fit ends where the parameters make sense"
     return lens
+
+
+def _mean_radius(lens: Lens, theta: Floats) -> Floats:
+    """Over all directions, of a lens that may be bent."""
+    if not isinstance(lens, BentLens):
+        return lens.radius(theta)
+    phi = around_axis(72)[:, None]
+    point = image_point(lens, *np.broadcast_arrays(theta, phi))
+    away = np.stack(np.broadcast_arrays(np.cos(phi), np.sin(phi)), axis=-1)
+    return np.asarray(np.sum(point * away, axis=-1).mean(axis=0))
 
 
 def _off_deg(new: Camera, rays: Floats, pixel: Floats, off_px: Floats) -> Floats:
