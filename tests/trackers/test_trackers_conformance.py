@@ -21,7 +21,9 @@ from hypothesis import strategies as st
 from freelook.axes import AXES
 from freelook.clock import now_ns
 from freelook.errors import TrackerError
-from freelook.rotations import head_angles_deg
+from freelook.gimbal import CENTRE
+from freelook.head import Head
+from freelook.rotations import angle_between_deg, head_angles_deg
 from freelook.trackers import joystick, known_trackers, open_tracker
 from freelook.trackers.elrs import crc8_dvb_s2
 from freelook.types import Pose, Tracker
@@ -186,6 +188,29 @@ def test_close_may_come_first_and_often(tracker: Tracker) -> None:
     tracker.close()
     tracker.close()
     assert list(tracker.poses()) == []
+
+
+def test_recentre_disable_and_enable_work_with_each(
+    tracker: Tracker, stand_in: StandIn, wait_until: Callable[..., None]
+) -> None:
+    head = Head("test", tracker)
+    head.start()
+
+    def is_so(state: str, off_deg: float) -> bool:
+        stand_in[1](tracker)
+        aim = head.aim(now_ns())
+        return aim.state == state and angle_between_deg(aim.body_from_view, CENTRE) <= off_deg
+
+    try:
+        wait_until(lambda: is_so("tracking", 180))
+        # again and again: the wandering one goes on at 24 degrees a second
+        wait_until(lambda: (head.recentre(now_ns()), is_so("tracking", 3))[1])
+        head.disable(now_ns())
+        wait_until(lambda: is_so("disabled", 1e-9))
+        head.enable(now_ns())
+        wait_until(lambda: is_so("tracking", 180))
+    finally:
+        head.close()
 
 
 @pytest.mark.parametrize("kind", TURNABLE)
