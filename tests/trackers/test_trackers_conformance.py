@@ -201,10 +201,14 @@ def test_recentre_disable_and_enable_work_with_each(
         aim = head.aim(now_ns())
         return aim.state == state and angle_between_deg(aim.body_from_view, CENTRE) <= off_deg
 
+    def recentred() -> bool:
+        """Asked again and again, because the wandering head goes on at 24 degrees a second."""
+        head.recentre(now_ns())
+        return is_so("tracking", 3)
+
     try:
         wait_until(lambda: is_so("tracking", 180))
-        # again and again: the wandering one goes on at 24 degrees a second
-        wait_until(lambda: (head.recentre(now_ns()), is_so("tracking", 3))[1])
+        wait_until(recentred)
         head.disable(now_ns())
         wait_until(lambda: is_so("disabled", 1e-9))
         head.enable(now_ns())
