@@ -201,10 +201,11 @@ _Weights = Callable[[Floats], Floats]
 
 def _graduated(problem: Problem, state: State, steps: int = STEPS) -> State:
     """Robust steps: the scale follows the residuals down to their noise."""
-    scale = 3 * max(_noise(problem.residuals(state)), 1e-6)
+    every = np.ones(problem.count, bool)
+    scale = 3 * _noise(problem, state, every)
     for _ in range(8):
         state = _minimise(problem, state, _geman_mcclure(scale), steps, ROUGHLY)
-        before, scale = scale, 3 * max(_noise(problem.residuals(state)), 1e-6)
+        before, scale = scale, 3 * _noise(problem, state, every)
         if scale > 0.9 * before:
             break
     return state
@@ -228,14 +229,22 @@ def _cleaned(problem: Problem, state: State, steps: int) -> tuple[State, Floats]
 
 def _inliers(problem: Problem, state: State, counted: Floats) -> Floats:
     """1 for points within `REJECT` times the noise of those that counted before, 0 for others."""
-    residuals = problem.residuals(state)
-    limit = REJECT * max(_noise(residuals[counted > 0]), 1e-6)
-    return _enough(problem, (np.sqrt(_squares(residuals)) <= limit).astype(float))
+    limit = REJECT * _noise(problem, state, counted > 0)
+    distance = np.sqrt(_squares(problem.residuals(state)))
+    return _enough(problem, (distance <= limit).astype(float))
 
 
-def _noise(residuals: Floats) -> float:
-    """Standard deviation per coordinate, from the median length (Rayleigh: 1.1774 sigma)."""
-    return float(np.median(np.sqrt(_squares(residuals)))) / 1.1774
+def _noise(problem: Problem, state: State, counted: Bools) -> float:
+    """Standard deviation per coordinate, pixels, from the median length (Rayleigh: 1.1774 sigma).
+
+    Few points for many unknowns come nearer than their noise; the degrees of freedom make up for
+    that. Never quite 0.
+    """
+    seen, unknowns = 2 * int(counted.sum()), len(state.values) + 6 * len(problem.parts)
+    if not seen:
+        return 1e-6
+    median = float(np.median(np.sqrt(_squares(problem.residuals(state)[counted]))))
+    return max(median / 1.1774 / np.sqrt(max(1 - unknowns / seen, 0.1)), 1e-6)
 
 
 def _squares(residuals: Floats) -> Floats:
@@ -316,6 +325,8 @@ def _known(problem: Problem, state: State, counted: Floats) -> Adjusted:
         raise CalibrationError(UNDETERMINED) from None
     scale = 1 / np.sqrt(np.maximum(np.diag(each.sum(0)), 1e-300))
     each = each * np.outer(scale, scale)
+    if not np.isfinite(each).all():
+        raise CalibrationError(UNDETERMINED)
     condition = float(np.linalg.cond(each.sum(0))) if len(scale) else 1.0
     if not condition < WORST_CONDITION:
         raise CalibrationError(UNDETERMINED)

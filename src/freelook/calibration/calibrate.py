@@ -89,7 +89,6 @@ def calibrate(
     used, dropped = checked(views, size)
     progress("first guess")
     used, base, strays = _without_strays(used, _base(used, size, freedom), freedom)
-    check_fit(base)
     check_enough(base, used, freedom)
     models = AUTO if model == "auto" else (model,)
     candidates = tried(models, used, base, freedom, progress, drop=drop)
@@ -136,7 +135,10 @@ def _base(views: list[View], size: tuple[int, int], freedom: Freedom) -> Solutio
     best = min(refined, key=lambda s: s.noise_px / share_counted(s))
     solution = solve(best.camera, best.poses, views, freedom)
     poses, better = _other_poses(solution, views)
-    return solve(solution.camera, poses, views, freedom) if better else solution
+    if better:
+        solution = solve(solution.camera, poses, views, freedom)
+    check_fit(solution)
+    return solution
 
 
 def _even(view: View, most: int) -> View:
@@ -165,7 +167,10 @@ def _other_poses(solution: Solution, views: list[View]) -> tuple[list[Pose], boo
     A small flat target looks much the same from its mirrored pose, and a first guess from points
     some of which are wrong may be far off; a solution ends up in either.
     """
-    camera = with_field(solution.camera, seen_angle(solution, views))
+    try:
+        camera = with_field(solution.camera, seen_angle(solution, views))
+    except CalibrationError:
+        return list(solution.poses), False
     misses = np.array([float(np.median(np.linalg.norm(r, axis=1))) for r in solution.residuals])
     poor = misses > POOR_VIEW * np.median(misses)
     linear = [

@@ -25,7 +25,7 @@ from ..errors import CalibrationError, FreelookError
 from ..fitting.refit import refit
 from ..lens import MODELS, Lens, RadialSpline, growth_limit, vector
 from .bundle import Solution, resect_all, rms, solve
-from .field import MARGIN, seen_angle
+from .field import MARGIN, angles, seen_angle
 from .parameters import Freedom
 from .views import View
 
@@ -46,6 +46,7 @@ AUTO = (
 WORTH_IT = 0.99
 OVERFIT = 1.3  # times the RMS on views left out
 FOLDS = 5
+FEW_FOLDED = 0.02  # of the points that count
 KNOT_EVERY_DEG = 12.0
 NOT_FROM_BOARDS = {
     "splined_stereographic": "it has parameters where no corner was seen; radial_spline is as "
@@ -166,9 +167,28 @@ def _alone(
 ) -> Candidate:
     try:
         start = _start(model, base, seen_angle(base, views), freedom)
-        return Candidate(model, solution=solve(start, base.poses, views, freedom, robust=drop))
+        solution = solve(start, base.poses, views, freedom, robust=drop)
+        if drop:
+            solution = _without_folded(solution, views, freedom)
+        return Candidate(model, solution=solution)
     except FreelookError as error:
         return Candidate(model, why_not=str(error))
+
+
+def _without_folded(solution: Solution, views: Sequence[View], freedom: Freedom) -> Solution:
+    """Without the few points that fit only because a lens folds back beyond the others."""
+    limit = growth_limit(solution.camera.lens)
+    if limit >= seen_angle(solution, views):
+        return solution
+    counted = [
+        ok & (angles(pose, view) <= limit)
+        for pose, view, ok in zip(solution.poses, views, solution.inliers, strict=True)
+    ]
+    before = np.concatenate(solution.inliers).sum()
+    if np.concatenate(counted).sum() < (1 - FEW_FOLDED) * before:
+        return solution
+    camera, poses = solution.camera, solution.poses
+    return solve(camera, poses, views, freedom, robust=False, counted=counted)
 
 
 def _on_common_points(

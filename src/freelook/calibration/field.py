@@ -8,21 +8,26 @@ import numpy as np
 
 from ..camera import Camera, make_camera
 from ..errors import CalibrationError, ProfileError
-from ..lens import growth_limit
+from ..lens import Floats, growth_limit
 from .bundle import Solution
-from .views import View
+from .views import Pose, View
 
 MARGIN = np.radians(5.0)  # beyond the outermost point seen
 
 
 def seen_angle(solution: Solution, views: Sequence[View]) -> float:
     """The largest angle from the axis of a point that counts, radians."""
-    angles = [0.0]
-    for pose, view, ok in zip(solution.poses, views, solution.inliers, strict=True):
-        at = pose.apply(view.points[ok])
-        if len(at):
-            angles.append(float(np.arctan2(np.hypot(at[:, 0], at[:, 1]), at[:, 2]).max()))
-    return max(angles)
+    seen = [
+        angles(pose, view)[ok]
+        for pose, view, ok in zip(solution.poses, views, solution.inliers, strict=True)
+    ]
+    return float(np.concatenate(seen).max(initial=0.0))
+
+
+def angles(pose: Pose, view: View) -> Floats:
+    """(n,) of a view's points from the axis, radians."""
+    at = pose.apply(view.points)
+    return np.arctan2(np.hypot(at[:, 0], at[:, 1]), at[:, 2])
 
 
 def with_field(camera: Camera, seen: float) -> Camera:

@@ -25,6 +25,7 @@ SHAPES: tuple[type[Lens], ...] = (Perspective, Stereographic, Equidistant, Equis
 OUTERMOST_DEG = (20, 28, 36, 45, 54, 63, 72, 81, 90, 98, 106)
 CENTERS = (-0.1, 0.0, 0.1)  # of the picture's size, from its middle
 FEW_POINTS, FEW_VIEWS = 24, 12  # enough to tell good from bad
+SMOOTH_SHARE = 0.03  # of the target's size in the picture: points so near a smooth map are good
 KEPT = 3
 
 
@@ -81,6 +82,32 @@ def mirrored(pose: Pose, view: View) -> Pose:
     return Pose(Rotation.from_matrix(turn), at - turn @ middle)
 
 
+def smooth_part(view: View) -> View:
+    """The view without points that do not follow the others, as far as that shows without a lens.
+
+    However a lens bends, target and picture are joined by a smooth map: a polynomial of second or
+    third degree, fitted robustly. All points, if they are too few to tell.
+    """
+    count = len(view.pixels)
+    if count < 15:
+        return view
+    flat, _, _ = _flattened(view.points)
+    u, v = flat.T
+    terms = [np.ones(count), u, v, u * u, u * v, v * v]
+    if count >= 30:
+        terms += [u**3, u * u * v, u * v * v, v**3]
+    columns, weight = np.stack(terms, axis=-1), np.ones(count)
+    off = np.zeros(count)
+    for _ in range(10):
+        root = np.sqrt(weight)[:, None]
+        answer = np.linalg.lstsq(columns * root, view.pixels * root, rcond=None)[0]
+        off = np.linalg.norm(view.pixels - columns @ answer, axis=1)
+        weight = (1 + (off / (3 * max(float(np.median(off)), 1e-3))) ** 2) ** -2
+    extent = float(np.median(np.ptp(view.pixels[off <= np.median(off)], axis=0)))
+    good = off <= max(6 * float(np.median(off)), SMOOTH_SHARE * extent)
+    return view.only(good)
+
+
 _Scored = tuple[float, Lens, tuple[float, float]]
 
 
@@ -116,13 +143,10 @@ class _Few:
     """Some points of some views, the same number of each, to try thousands of lenses on."""
 
     def __init__(self, views: Sequence[View]) -> None:
-        thinned = [_thinned(view) for view in _spread(views)]
+        thinned = [_thinned(smooth_part(view)) for view in _spread(views)]
         self.points = np.stack([view.points for view in thinned])  # (views, n, 3)
         self.pixels = np.stack([view.pixels for view in thinned])  # (views, n, 2)
-        self.planes = [_plane(points) for points in self.points]
-        origins, axes, scales = (np.array(part) for part in zip(*self.planes, strict=True))
-        flat = np.einsum("vni,vij->vnj", self.points - origins[:, None], axes)
-        self.flat = flat[..., :2] / scales[:, None, None]
+        self.flat = np.stack([_flattened(points)[0] for points in self.points])
 
     def errors_px(self, lenses: Sequence[Lens], center: tuple[float, float]) -> Floats:
         """(lenses,) median over the views of their median pixel error, each with its best pose."""
@@ -167,8 +191,7 @@ def _rays(theta: Floats, phi: Floats) -> Floats:
 
 def _pose(points: Floats, rays: Floats, weights: Floats | None = None) -> Pose:
     """The pose of a flat target whose points (n, 3) are seen along unit rays (n, 3), linearly."""
-    origin, axes, scale = _plane(points)
-    flat = (points - origin) @ axes[:, :2] / scale
+    flat, axes, (origin, scale) = _flattened(points)
     each = None if weights is None else weights[None]
     rotation, translation = _flat_pose(flat[None], rays[None], each)
     camera_from_target = rotation[0] @ axes.T
@@ -201,6 +224,12 @@ def _flat_pose(flat: Floats, rays: Floats, weights: Floats | None = None) -> tup
     return np.concatenate([r, third[..., None]], axis=-1), h[..., 2]
 
 
+def _flattened(points: Floats) -> tuple[Floats, Floats, tuple[Floats, float]]:
+    """Points (n, 3) as (n, 2) in their own plane, of size 1; its axes; (origin, size)."""
+    origin, axes, scale = _plane(points)
+    return (points - origin) @ axes[:, :2] / scale, axes, (origin, scale)
+
+
 def _plane(points: Floats) -> tuple[Floats, Floats, float]:
     """Origin, right-handed axes (columns; the third is the normal) and size of flat points."""
     origin = points.mean(axis=0)
@@ -217,7 +246,7 @@ def _guess(
     error_px: float,
 ) -> Guess:
     poses = []
-    for view in views:
+    for view in map(smooth_part, views):
         offset = view.pixels - center
         theta = _angles(lens, np.hypot(offset[:, 0], offset[:, 1]))
         poses.append(_pose(view.points, _rays(theta, np.arctan2(offset[:, 1], offset[:, 0]))))
