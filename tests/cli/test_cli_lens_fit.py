@@ -242,3 +242,11 @@ def test_options_are_checked_before_long_work(
 def test_a_missing_file_is_told(capsys: pytest.CaptureFixture[str]) -> None:
     assert fit("none.csv") == 2
     assert "cannot read none.csv: No such file" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("option", [["--center", "480,480"], ["--free-offset"]])
+def test_what_3d_points_say_themselves_is_not_taken_twice(
+    option: list[str], points: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert fit(points, "--size", "960x960", *option) == 2
+    assert f"{option[0]} is for angle_deg,radius_px" in capsys.readouterr().err

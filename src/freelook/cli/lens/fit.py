@@ -121,6 +121,8 @@ def _check(args: argparse.Namespace, table: Table) -> None:
         )
     if not table.is_curve and args.free_offset:
         raise FreelookError("--free-offset is for angle_deg,radius_px; here the centre is sought")
+    if not table.is_curve and args.center:
+        raise FreelookError("--center is for angle_deg,radius_px; here the centre is found")
     if args.output and args.size is None:
         raise FreelookError(
             "a profile says for which picture it is: give --size, such as 1440x1440"
