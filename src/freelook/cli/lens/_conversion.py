@@ -88,7 +88,7 @@ def target_format(path: Path) -> str:
     ]
     if named:
         return max(named, key=lambda name: len(name))  # "py-ocamcalib" holds "ocamcalib"
-    usual = [name for name in possible if format_module(name).SUFFIX == path.suffix.lower()]
+    usual = [name for name in possible if path.suffix.lower() == format_module(name).SUFFIX]
     if "freelook" in usual or len(usual) == 1:
         return usual[0]
     raise FreelookError(
