@@ -380,6 +380,6 @@ def _solution(problem: _Problem, state: State, weights: Floats) -> Solution:
 
 
 UNDETERMINED = (
-    "these views do not determine the camera; add views with the target tilted, near the rim and "
-    "at other distances"
+    "the views do not determine all parameters: add views with the target tilted, near the rim and "
+    "at other distances, or take a model with fewer parameters"
 )

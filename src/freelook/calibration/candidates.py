@@ -44,8 +44,10 @@ AUTO = (
 )
 # A model with more parameters must predict at least this much better.
 WORTH_IT = 0.99
+OUT_OF_THE_RACE = 1.5  # times the best RMS: what fits so badly need not be tested further
 OVERFIT = 1.3  # times the RMS on views left out
 FOLDS = 5
+BEYOND = np.radians(0.5)  # of a model's end: more than the first lens may be off there
 FEW_FOLDED = 0.02  # of the points that count
 KNOT_EVERY_DEG = 12.0
 NOT_FROM_BOARDS = {
@@ -62,7 +64,8 @@ class Candidate:
     """A model that was tried: how well it fits, how well it predicts, or why it could not be.
 
     `rms_px` and `cross_validated_px` (RMS, 2-D, per point) of all candidates are over the same
-    points. The latter is NaN with fewer than 3 views, or where the rest did not determine it.
+    points. The latter is NaN with fewer than 3 views, where the rest did not determine the model,
+    and for models that fit 1.5 times as badly as the best.
     """
 
     model: str
@@ -109,8 +112,16 @@ def tried(
     if not able:
         return alone
     counted = min(able, key=_median_px).inliers
+    progress("the same points for all")
+    same = [_on_common_points(c, views, freedom, counted) for c in alone]
     progress("views left out")
-    return [_on_common_points(c, views, freedom, counted) for c in alone]
+    least = np.nanmin([c.rms_px for c in same] + [np.inf])
+    return [
+        replace(c, cross_validated_px=cross_validate(c.solution, views, freedom))
+        if c.solution is not None and c.rms_px <= OUT_OF_THE_RACE * least
+        else c
+        for c in same
+    ]
 
 
 def chosen(candidates: Sequence[Candidate]) -> Candidate:
@@ -202,8 +213,7 @@ def _on_common_points(
         _check_growth(solution.camera.lens, seen_angle(solution, views))
     except FreelookError as error:
         return Candidate(candidate.model, why_not=str(error))
-    predicted = cross_validate(solution, views, freedom)
-    return Candidate(candidate.model, solution.rms_px, predicted, solution)
+    return Candidate(candidate.model, solution.rms_px, solution=solution)
 
 
 def _median_px(solution: Solution) -> float:
@@ -234,7 +244,7 @@ def _start(name: str, base: Solution, seen: float, freedom: Freedom) -> Camera:
     except FreelookError:  # it may still be solved for, on the points
         f = float(base.camera.lens.radius(np.array([0.01]))[0] / 0.01)
         return replace(base.camera, lens=MODELS[name](f))  # type: ignore[call-arg]
-    if near.lens.hard_limit <= np.pi / 2 and seen > np.radians(88):
+    if near.lens.hard_limit <= np.pi / 2 and seen > np.pi / 2 + BEYOND:
         raise CalibrationError(
             f"{name} lenses end at 90 degrees from the axis; points were seen at "
             f"{np.degrees(seen):.1f}"
