@@ -30,6 +30,9 @@ def figures(calibration: Calibration, without: list[str]) -> dict[str, Any]:
         "sigma": dict(zip(solution.names, map(float, sigma), strict=True)),
         "correlation": (solution.covariance / np.outer(sigma, sigma)).tolist(),
         "condition": solution.condition,
+        "uncertainty_px": calibration.uncertainty_px,
+        "together": solution.together,
+        "doubts": list(calibration.doubts),
         "points": sum(len(view.pixels) for view in calibration.views),
         "points_dropped": calibration.rejected,
         "views": [
@@ -87,7 +90,16 @@ def sentences(calibration: Calibration) -> list[str]:
         f"{model_name(camera.lens)}, corners seen to "
         f"{np.degrees(calibration.seen_rad):.1f} degrees from the axis; "
         f"field {np.degrees(2 * camera.theta_max):.0f} degrees",
+        f"where corners were seen, the projection is known to {calibration.uncertainty_px:.2f} px "
+        "(standard deviation)",
     ]
+    if solution.together > TOGETHER:
+        lines.append(
+            f"errors of neighbouring corners go together: the views disagree {solution.together:.1f} "
+            "times as much as single errors would make them, which is taken into account; a board "
+            "that is not quite flat, or pictures taken in motion, are the usual reasons"
+        )
+    lines += [f"weak: {doubt}" for doubt in calibration.doubts]
     if calibration.rejected:
         share = calibration.rejected / sum(len(v.pixels) for v in calibration.views)
         lines.append(f"{calibration.rejected} points ({share:.1%}) dropped: too far from the rest")
@@ -96,6 +108,8 @@ def sentences(calibration: Calibration) -> list[str]:
         lines.append("the views hardly determine all parameters: add tilted ones near the rim")
     return lines + [weakness for weakness in weaknesses(calibration)]
 
+
+TOGETHER = 2.0  # below, it may be chance
 
 DIRECTIONS = (
     "right",

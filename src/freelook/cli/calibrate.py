@@ -50,6 +50,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--skew", action="store_true", help="solve for skewed pixels too")
     parser.add_argument("--square-pixels", action="store_true", help="take pixels as square")
+    parser.add_argument(
+        "--keep-all", action="store_true", help="let every corner count, however far off"
+    )
     parser.add_argument("-o", "--output", metavar="FILE", help="write the lens profile here")
     parser.add_argument("--name", default="", help="for people: which camera and lens it is")
     parser.add_argument("--report", metavar="HTML", help="write a page with pictures of it all")
@@ -84,7 +87,9 @@ def _run(args: argparse.Namespace, target: Target) -> int:
     say = (
         (lambda _: None) if args.json else (lambda what: print(f"solving: {what}", file=sys.stderr))
     )
-    calibration = calibrate(found.views, found.size, args.model, freedom, progress=say)
+    calibration = calibrate(
+        found.views, found.size, args.model, freedom, drop=not args.keep_all, progress=say
+    )
     if args.json:
         print(json.dumps(figures(calibration, found.without), indent=2))
     else:
