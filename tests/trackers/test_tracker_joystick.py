@@ -17,6 +17,8 @@ from freelook.rotations import head_angles_deg
 from freelook.trackers import joystick, open_tracker
 from freelook.trackers.joystick import AxisSampler, parse_inputs
 
+pytest.importorskip("evdev", reason="python-evdev is not installed (freelook[evdev])")
+
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="evdev is Linux's")
 
 X, Y, Z = 0, 1, 2
