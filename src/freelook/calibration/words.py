@@ -95,9 +95,10 @@ def sentences(calibration: Calibration) -> list[str]:
     ]
     if solution.together > TOGETHER:
         lines.append(
-            f"errors of neighbouring corners go together: the views disagree {solution.together:.1f} "
-            "times as much as single errors would make them, which is taken into account; a board "
-            "that is not quite flat, or pictures taken in motion, are the usual reasons"
+            "errors of neighbouring corners go together: the views disagree "
+            f"{solution.together:.1f} times as much as single errors would make them, which is "
+            "taken into account; a board that is not quite flat, or pictures taken in motion, are "
+            "the usual reasons"
         )
     lines += [f"weak: {doubt}" for doubt in calibration.doubts]
     if calibration.rejected:

@@ -158,7 +158,8 @@ def _models(calibration: Calibration):  # type: ignore[no-untyped-def]
             table.add_row(candidate.model, "", "", candidate.why_not)
             continue
         chosen = "chosen" if candidate.model == calibration.model else candidate.remark
-        figures = f"{candidate.rms_px:.3f}", f"{candidate.cross_validated_px:.3f}"
+        predicted = candidate.cross_validated_px
+        figures = f"{candidate.rms_px:.3f}", f"{predicted:.3f}" if np.isfinite(predicted) else ""
         table.add_row(candidate.model, *figures, chosen)
     return table
 
