@@ -26,7 +26,7 @@ from .views import FEWEST_POINTS, View
 
 # The target is followed in a picture of at most this many pixels along its longer side; once it is
 # to be taken it is looked for at full size.
-FOLLOWED_PX = 960
+FOLLOWED_PX = 800
 LEAST_SHARE = 0.4  # of the most points ever seen: with fewer, most of the board is hidden
 FIRST_SOLVE = 4  # views
 MOST_VIEWS = 40  # that are taken without being asked for
