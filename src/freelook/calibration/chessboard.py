@@ -1,45 +1,47 @@
-"""Chessboards in strongly bent pictures: corners first, then the grid that grows through them.
+"""Chessboards in strongly bent pictures.
 
-    saddle points of the blurred picture -> those whose surroundings alternate dark, light, dark,
-    light -> a grid grown from corner to corner -> corners placed to a fraction of a pixel
+    corner candidates -> the largest grid of them -> corners too faint to be found alone, where the
+    grid expects them -> every corner placed to a fraction of a pixel -> those that look like none
+    dropped
 
-Nothing here expects straight lines or the whole board: a grid grows as long as the next corner is
-where the last ones lead to, so a fisheye's bends and a board cut by the picture do no harm. Which
-corner of the board is which does not matter to a calibration, only that neighbours are neighbours.
+First in the picture made small, where noise and blur count for little, then finer for as long as
+the squares are small.
 """
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from ..lens import Floats
+from ._corners import SEARCH, find_corners, largest_grid
+from ._lattice import Bools, Cells, Lattice, LocalMaps, in_squares
+from ._saddles import LIKE, Gray, Slopes, Window, edge_blur_px, likeness, placed
 
-Gray = NDArray[np.uint8]
-Cell = tuple[int, int]
-
-# blur of the corner search, pixels, and radius of the ring around a corner that is looked at
-SCALES = ((1.2, 4.0), (2.4, 8.0))
-RING = 32
-SEARCH = 0.33  # of a square: how far from its place a corner may be
-SEEDS = 60
 FEWEST = 12  # corners; below that a grid is chance
-# Half width of the patch a corner is placed by: of the local square, and at most so many pixels.
-# Wider ones take in bent edges, narrower ones fewer pixels: both cost accuracy on real pictures.
-WINDOW, WIDEST_PX = 0.33, 8.0
-HALF = 8  # samples on each side of the middle of that patch
-BLUR_PX = 0.7
+FEWEST_LINES = 3
+FAINT_SEARCH = 0.6
+STRAY = 0.35  # of a square: how far from where its neighbours expect it a corner may be
+FAINT = 0.1  # of the usual contrast; what is fainter is no corner of this board
+COARSEST = 150  # pixels along the shorter side
+LARGEST = 6_000_000  # pixels: larger pictures are looked at only if smaller ones show a board
+TINY_PX = 5.0  # squares that are looked at enlarged
+DOUBLED = 2_000_000  # pixels: pictures up to that, enlarged, are looked at before giving up
+SHARP_PX = 2.0  # blur below which nothing has to be done about it
+USUAL_ROWS = 800
+RESOLVED_PX = 12.0  # wide enough a square that a finer picture shows no more corners
 
 
 @dataclass(frozen=True)
 class Grid:
-    """Corners of one board: `pixels` (n, 2) and `cells` (n, 2), column and row, from 0."""
+    """Corners of one board: `pixels` (n, 2) and `cells` (n, 2), column and row, from 0.
+
+    Rows are clockwise (y down) of columns, as seen in the picture.
+    """
 
     cells: NDArray[np.int64]
     pixels: Floats
@@ -57,328 +59,169 @@ def find_chessboard(gray: Gray, inner: tuple[int, int] | None = None) -> Grid | 
     `inner` is the number of inner corners, across and down in either order: a grid that is larger
     is cut to the part of that size that has most corners; a smaller one is taken as it is.
     """
-    best: Grid | None = None
-    for blur, ring in SCALES:
-        corners = _corners(gray, blur, ring)
-        cells = _largest_grid(corners)
-        if cells is None:
-            continue
-        grid = _as_grid(_completed(gray, cells, ring), inner)
-        if grid is not None and (best is None or len(grid.cells) > len(best.cells)):
-            best = grid
-    return None if best is None else _refined(gray, best)
-
-
-@dataclass(frozen=True)
-class _Corners:
-    """Candidates: place, the directions of their two edges, strength.
-
-    `angles` (n, 2): an edge at angles[:, 0] has light on its clockwise (y down) side going outward
-    from the corner, one at angles[:, 1] dark; both modulo pi, radians.
-    """
-
-    pixels: Floats
-    angles: Floats
-    strength: Floats
-    tree: cKDTree = field(init=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "tree", cKDTree(self.pixels))
-
-
-def _corners(gray: Gray, blur: float, ring: float) -> _Corners:
-    smooth = cv2.GaussianBlur(gray.astype(np.float32), (0, 0), blur)
-    xx = cv2.Sobel(smooth, cv2.CV_32F, 2, 0)
-    yy = cv2.Sobel(smooth, cv2.CV_32F, 0, 2)
-    xy = cv2.Sobel(smooth, cv2.CV_32F, 1, 1)
-    saddle = np.maximum(xy * xy - xx * yy, 0)
-    around = np.ones((2 * round(ring / 2) + 1,) * 2, np.uint8)
-    peak = (saddle == cv2.dilate(saddle, around)) & (saddle > 1e-3 * np.percentile(saddle, 99.5))
-    border = int(ring) + 1
-    peak[:border], peak[-border:], peak[:, :border], peak[:, -border:] = (False,) * 4
-    y, x = np.nonzero(peak)
-    return _alternating(smooth, np.stack([x, y], axis=-1).astype(np.float64), ring)
-
-
-def _alternating(smooth: NDArray[np.float32], at: Floats, ring: float) -> _Corners:
-    """Those whose ring goes dark, light, dark, light."""
-    turn = np.arange(RING) * (2 * np.pi / RING)
-    ring_xy = ring * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
-    values = _sampled(smooth, at[:, None] + ring_xy)
-    values = values - values.mean(axis=1, keepdims=True)
-    waves = np.fft.rfft(values, axis=1)
-    energy = np.sum(np.abs(waves[:, 1:]) ** 2, axis=1)
-    second = np.abs(waves[:, 2]) ** 2
-    # four changes of sign; the third harmonic and the first are what edges and noise have
-    light = values > 0
-    changes = np.sum(light != np.roll(light, 1, axis=1), axis=1)
-    contrast = np.abs(waves[:, 2]) * 2 / RING
-    good = (second > 0.6 * energy) & (changes == 4) & (contrast > 6)
-    return _Corners(at[good], _edges(values[good]), contrast[good])
-
-
-def _edges(values: Floats) -> Floats:
-    """(n, 2) directions, modulo pi, of the edges where the ring turns light and where dark."""
-    angles = np.empty((len(values), 2))
-    step = 2 * np.pi / RING
-    following = np.roll(values, -1, axis=1)
-    for k, (low, high) in enumerate(((values, following), (following, values))):
-        crossing = (low <= 0) & (high > 0)
-        part = np.where(crossing, np.abs(values) / (np.abs(values) + np.abs(following) + 1e-9), 0)
-        turn = (np.arange(RING) + part) * step
-        # two crossings half a turn apart: their mean modulo pi, by doubling the angle
-        doubled = np.sum(np.exp(2j * turn) * crossing, axis=1)
-        angles[:, k] = np.angle(doubled) / 2 % np.pi
-    return angles
-
-
-def _sampled(picture: NDArray[np.float32], at: Floats) -> Floats:
-    """Bilinear values at `at` (..., 2); the border's beyond it."""
-    shape = at.shape[:-1]
-    flat = at.reshape(-1, 2).astype(np.float32)
-    values = np.empty(len(flat), np.float32)
-    for start in range(0, len(flat), 30000):  # OpenCV's pictures have less than 32768 columns
-        part = flat[None, start : start + 30000]
-        values[start : start + 30000] = cv2.remap(
-            picture,
-            np.ascontiguousarray(part[..., 0]),
-            np.ascontiguousarray(part[..., 1]),
-            cv2.INTER_LINEAR,
-            borderMode=cv2.BORDER_REPLICATE,
-        )[0]
-    return values.reshape(shape).astype(np.float64)
-
-
-def _largest_grid(corners: _Corners) -> dict[Cell, Floats] | None:
-    """Grids grown from the strongest corners in turn; the largest."""
-    taken = np.zeros(len(corners.pixels), bool)
-    best: dict[Cell, int] = {}
-    for seed in np.argsort(-corners.strength)[:SEEDS]:
-        if taken[seed]:
-            continue
-        grown = _grown(corners, int(seed))
-        taken[list(grown.values())] = True
-        if len(grown) > len(best):
-            best = grown
-    if len(best) < FEWEST:
-        return None
-    return {cell: corners.pixels[i] for cell, i in best.items()}
-
-
-STEPS: tuple[Cell, ...] = ((1, 0), (-1, 0), (0, 1), (0, -1))
-
-
-def _grown(corners: _Corners, seed: int) -> dict[Cell, int]:
-    """Corner numbers by cell, from one corner outward, nearest first."""
-    start = _first_square(corners, seed)
-    if start is None:
-        return {}
-    cells, owner = dict(start), {i: cell for cell, i in start.items()}
-    places = {cell: corners.pixels[i] for cell, i in cells.items()}
-    waiting = deque(cells)
-    while waiting:
-        cell = waiting.popleft()
-        for step in STEPS:
-            target = (cell[0] + step[0], cell[1] + step[1])
-            if target in cells:
-                continue
-            expected = _expected(places, cell, step)
-            if expected is None:
-                continue
-            found = _corner_near(corners, *expected, target, _along(corners, cells[cell], cell))
-            if found is None or found in owner:
-                continue
-            places[target] = corners.pixels[found]
-            cells[target], owner[found] = found, target
-            waiting.append(target)
-            waiting.append(cell)
-    return cells
-
-
-def _along(corners: _Corners, i: int, cell: Cell) -> Floats:
-    """Edge directions along the grid's two axes, whichever way this corner's colours lie."""
-    angles = corners.angles[i]
-    return angles if sum(cell) % 2 == 0 else angles[::-1]
-
-
-def _first_square(corners: _Corners, seed: int) -> dict[Cell, int] | None:
-    """The seed and one neighbour along each of its edges."""
-    here, angles = corners.pixels[seed], corners.angles[seed]
-    near = [i for i in corners.tree.query(here, k=min(13, len(corners.pixels)))[1] if i != seed]
-    cells: dict[Cell, int] = {(0, 0): seed}
-    for axis in range(2):
-        along = np.array([np.cos(angles[axis]), np.sin(angles[axis])])
-        for i in near:
-            offset = corners.pixels[i] - here
-            distance = float(np.hypot(*offset))
-            straight = abs(float(offset @ along)) > 0.94 * distance
-            # a neighbour's colours lie the other way round
-            swapped = _turn_between(corners.angles[i][::-1], angles).max() < 0.5
-            if straight and swapped:
-                sign = 1 if offset @ along > 0 else -1
-                cells[(sign, 0) if axis == 0 else (0, sign)] = i
-                break
-    return cells if len(cells) == 3 else None
-
-
-def _turn_between(a: Floats, b: Floats) -> Floats:
-    """Between directions modulo pi, in [0, pi/2]."""
-    turn = np.abs(a - b) % np.pi
-    return np.minimum(turn, np.pi - turn)
-
-
-def _expected(places: Mapping[Cell, Floats], cell: Cell, step: Cell) -> tuple[Floats, float] | None:
-    """Where the corner beyond `cell` should be, and the length of the step there."""
-    here, back = places[cell], places.get((cell[0] - step[0], cell[1] - step[1]))
-    steps = []
-    for side in ((step[1], step[0]), (-step[1], -step[0])):  # the same step in the next rows
-        start = places.get((cell[0] + side[0], cell[1] + side[1]))
-        end = places.get((cell[0] + side[0] + step[0], cell[1] + side[1] + step[1]))
-        if start is not None and end is not None:
-            steps.append(end - start)
-    if back is not None:
-        last = here - back
-        before = places.get((cell[0] - 2 * step[0], cell[1] - 2 * step[1]))
-        # three in a row tell how the steps shrink
-        steps.append(last if before is None else last + 0.7 * (last - (back - before)))
-    if not steps:
-        return None
-    mean = np.mean(steps, axis=0)
-    return here + mean, float(np.hypot(*mean))
-
-
-def _corner_near(
-    corners: _Corners, place: Floats, step: float, cell: Cell, along: Floats
-) -> int | None:
-    """The corner at a place, if its edges run along the grid and its colours lie rightly."""
-    distance, i = corners.tree.query(place, distance_upper_bound=max(SEARCH * step, 1.5))
-    if not np.isfinite(distance):
-        return None
-    return int(i) if _turn_between(_along(corners, int(i), cell), along).max() < 0.6 else None
-
-
-def _completed(gray: Gray, cells: dict[Cell, Floats], ring: float) -> dict[Cell, Floats]:
-    """With corners that were too faint to be found alone, where the grid expects them."""
-    smooth = cv2.GaussianBlur(gray.astype(np.float32), (0, 0), 1.0)
-    cells = dict(cells)
-    for _ in range(4):
-        added = {}
-        for cell in list(cells):
-            for step in STEPS:
-                target = (cell[0] + step[0], cell[1] + step[1])
-                if target in cells or target in added:
-                    continue
-                expected = _expected(cells, cell, step)
-                if expected is not None and (at := _faint(gray, smooth, *expected)) is not None:
-                    added[target] = at
-        if not added:
+    best: Lattice | None = None
+    for level, scale in _levels(gray):
+        if not _worthwhile(level, gray, best):
             break
-        cells.update(added)
-    return cells
+        lattice = _board(level)
+        if lattice is not None and (best is None or len(lattice) > len(best)):
+            cells = lattice.cells()
+            best = Lattice.of(cells, (lattice.pixels(cells) + 0.5) / scale - 0.5)
+    if best is None:
+        return None
+    slopes = Slopes.of(gray)
+    best = _checked(best, slopes, _suited(slopes, best))
+    if best is None:
+        return None
+    alike, _ = _alike(slopes, best.cells(), _corner_maps(best))
+    return _as_grid(best, inner, float(alike.mean()))
 
 
-def _faint(gray: Gray, smooth: NDArray[np.float32], place: Floats, step: float) -> Floats | None:
+def _worthwhile(level: Gray, gray: Gray, found: Lattice | None) -> bool:
+    """Whether to look at this size of the picture after a smaller one showed `found`."""
+    if found is None:
+        return level.size <= (DOUBLED if level.size > gray.size else LARGEST)
+    narrowest = float(_corner_maps(found).shortest_step().min())
+    if level.size > gray.size:
+        return narrowest < TINY_PX
+    return narrowest * np.sqrt(level.size / gray.size) / 2 < RESOLVED_PX
+
+
+def _board(level: Gray) -> Lattice | None:
+    """The largest board in one size of the picture."""
+    lattice = largest_grid(find_corners(level))
+    if lattice is None or len(lattice) < FEWEST:
+        return None
+    slopes = Slopes.of(level)
+    lattice.grow(_Faint(slopes, lattice))
+    return _checked(lattice, slopes, Window())
+
+
+def _levels(gray: Gray) -> Iterator[tuple[Gray, Floats]]:
+    """The picture at growing sizes, the smallest first, and its scale along x and y."""
     rows, columns = gray.shape
-    reach = max(2, round(0.3 * step))
-    margin = reach + 4
-    if not (margin < place[0] < columns - margin and margin < place[1] < rows - margin):
-        return None
-    at = cv2.cornerSubPix(
-        gray,
-        place.astype(np.float32).reshape(1, 1, 2),
-        (reach, reach),
-        (-1, -1),
-        (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 20, 0.01),
-    ).reshape(2)
-    if np.hypot(*(at - place)) > SEARCH * step:
-        return None
-    found = _alternating(smooth, at[None].astype(np.float64), float(np.clip(0.35 * step, 2.0, 8.0)))
-    return at.astype(np.float64) if len(found.pixels) else None
+    halvings = max(0, int(np.log2(max(1.0, min(rows, columns) / COARSEST))))
+    for halved in range(halvings, 0, -1):
+        size = (columns >> halved, rows >> halved)
+        scale = np.array(size) / (columns, rows)
+        yield cv2.resize(gray, size, interpolation=cv2.INTER_AREA), scale
+    yield gray, np.ones(2)
+    if 4 * gray.size <= LARGEST:
+        size = (2 * columns, 2 * rows)
+        yield cv2.resize(gray, size, interpolation=cv2.INTER_LINEAR), np.full(2, 2.0)
 
 
-def _as_grid(cells: dict[Cell, Floats], inner: tuple[int, int] | None) -> Grid | None:
-    index = np.array(list(cells))
-    pixels = np.array(list(cells.values()))
-    # a line of the grid with a single corner is more likely chance than board
-    while len(index):
-        keep = np.ones(len(index), bool)
-        for axis in range(2):
-            values, counts = np.unique(index[:, axis], return_counts=True)
-            keep &= ~np.isin(index[:, axis], values[counts < 2])
-        if keep.all():
-            break
-        index, pixels = index[keep], pixels[keep]
-    if len(index) < FEWEST:
+class _Faint:
+    """Finds corners by the picture alone where a grid expects them."""
+
+    def __init__(self, slopes: Slopes, lattice: Lattice) -> None:
+        self.slopes = slopes
+        alike, contrast = _alike(slopes, lattice.cells(), _corner_maps(lattice))
+        self.sign = np.sign(alike.mean())
+        self.least = FAINT * float(np.median(contrast))
+
+    def __call__(self, cells: Cells, maps: LocalMaps) -> Floats:
+        at, good = placed(self.slopes, maps.place, maps, Window())
+        good &= in_squares(maps.axes, at - maps.place) < FAINT_SEARCH
+        here = LocalMaps(np.where(good[:, None], at, maps.place), maps.axes, maps.bend, maps.known)
+        alike, contrast = _alike(self.slopes, cells, here)
+        good &= (self.sign * alike > LIKE) & (contrast > self.least)
+        return np.where(good[:, None], at, np.nan)
+
+
+def _corner_maps(lattice: Lattice) -> LocalMaps:
+    """The local maps around the known corners, from exactly there."""
+    cells = lattice.cells()
+    maps = lattice.maps(cells, own=True)
+    return LocalMaps(lattice.pixels(cells), maps.axes, maps.bend, maps.known)
+
+
+def _alike(slopes: Slopes, cells: Cells, maps: LocalMaps) -> tuple[Floats, Floats]:
+    """As `likeness`, with one sign for a whole board: that of cell (0, 0)."""
+    alike, contrast = likeness(slopes.level, maps)
+    return alike * np.where(cells.sum(axis=1) % 2 == 1, -1.0, 1.0), contrast
+
+
+def _suited(slopes: Slopes, lattice: Lattice) -> Window:
+    """A window as wide as edges are blurred, and as the picture is large.
+
+    Smoothing a blurred picture would only bring the next squares nearer.
+    """
+    blur = edge_blur_px(slopes, _corner_maps(lattice))
+    wide = 12.0 * max(1.0, min(slopes.level.shape) / USUAL_ROWS)
+    return Window(widest_px=max(wide, 10 * blur if blur > SHARP_PX else 0.0))
+
+
+def _checked(lattice: Lattice, slopes: Slopes, window: Window) -> Lattice | None:
+    """Corners placed finely; without those that look like none or are where none should be."""
+    cells, maps = lattice.cells(), _corner_maps(lattice)
+    at, good = placed(slopes, maps.place, maps, window)
+    good &= maps.known & (in_squares(maps.axes, at - maps.place) < SEARCH)
+    fine = _kept(cells, at, good)
+    if len(fine) < FEWEST:
         return None
-    index = index - index.min(axis=0)
+    cells, maps = fine.cells(), _corner_maps(fine)
+    alike, contrast = _alike(slopes, cells, maps)
+    good = (np.sign(alike.mean()) * alike > LIKE) & (contrast > FAINT * np.median(contrast))
+    fine = _kept(cells, maps.place, good)
+    fine.drop_strays(STRAY)
+    fine.drop_thin_lines(2)
+    lines = [len(np.unique(line)) for line in fine.cells().T]
+    return fine if len(fine) >= FEWEST and min(lines) >= FEWEST_LINES else None
+
+
+def _kept(cells: Cells, pixels: Floats, good: Bools) -> Lattice:
+    return Lattice.of(cells[good], pixels[good])
+
+
+def _as_grid(lattice: Lattice, inner: tuple[int, int] | None, alike: float) -> Grid | None:
+    """`alike`: positive if the square before cell (0, 0), up and left of it, is light."""
+    cells = lattice.cells()
     if inner is not None:
-        kept = _cut(index, inner)
-        index, pixels = index[kept], pixels[kept]
-        index = index - index.min(axis=0)
-    return Grid(index, pixels)
+        cells = cells[_cut(cells - cells.min(axis=0), inner)]
+    if len(cells) < FEWEST:
+        return None
+    pixels = lattice.pixels(cells)
+    first = cells.min(axis=0)
+    light = (alike > 0) == (first.sum() % 2 == 0)
+    return _turned(Grid(cells - first, pixels), inner, light)
 
 
-def _cut(index: NDArray[np.int64], inner: tuple[int, int]) -> NDArray[np.bool_]:
+def _turned(grid: Grid, inner: tuple[int, int] | None, light: bool) -> Grid:
+    """The grid so that it lies as alike as can be in all pictures of one board.
+
+    As `inner` says where it fits only so; a whole board that looks different upside down with its
+    dark corner first; and then with its rows to the right. `light`: the square before cell (0, 0).
+    """
+    turns = []
+    for _ in range(4):
+        turns.append((grid, light))
+        last = grid.cells[:, 0].max()
+        # the first cell was the last of its row, and the square before it that above on the right
+        light = light != (last % 2 == 0)
+        grid = Grid(np.stack([grid.cells[:, 1], last - grid.cells[:, 0]], axis=-1), grid.pixels)
+    if inner is not None:
+        turns = [t for t in turns if t[0].size[0] <= inner[0] and t[0].size[1] <= inner[1]]
+    if sum(grid.size) % 2 == 1 and inner in (None, turns[0][0].size):
+        turns = [turn for turn in turns if not turn[1]]
+    return max(turns, key=lambda turn: _rightward(turn[0]))[0]
+
+
+def _rightward(grid: Grid) -> float:
+    """How far to the right the picture's x grows with the columns."""
+    columns = grid.cells[:, 0] - grid.cells[:, 0].mean()
+    return float(columns @ grid.pixels[:, 0])
+
+
+def _cut(cells: Cells, inner: tuple[int, int]) -> Bools:
     """Which cells lie in the part of the board's size that has most of them."""
-    best = np.zeros(len(index), bool)
+    best = np.zeros(len(cells), bool)
+    last = cells.max(axis=0)
     for columns, rows in {inner, inner[::-1]}:
-        for i in range(max(1, int(index[:, 0].max()) - columns + 2)):
-            for j in range(max(1, int(index[:, 1].max()) - rows + 2)):
-                x, y = index[:, 0] - i, index[:, 1] - j
+        for i in range(max(1, int(last[0]) - columns + 2)):
+            for j in range(max(1, int(last[1]) - rows + 2)):
+                x, y = cells[:, 0] - i, cells[:, 1] - j
                 inside = (x >= 0) & (x < columns) & (y >= 0) & (y < rows)
                 if inside.sum() > best.sum():
                     best = inside
     return best
-
-
-def _refined(gray: Gray, grid: Grid) -> Grid:
-    """Every corner where the gradients of its surroundings are at right angles to the way to it.
-
-    The surroundings are a patch that follows the local grid: squashed and turned as the squares
-    are, so that near the rim it neither reaches into the next square nor wastes the own.
-    """
-    smooth = cv2.GaussianBlur(gray.astype(np.float32), (0, 0), BLUR_PX)
-    local = _local_steps(grid)
-    length = np.linalg.norm(local, axis=1, keepdims=True)
-    local *= np.minimum(WIDEST_PX / (WINDOW * np.maximum(length, 1e-9)), 1)
-    side = np.linspace(-1, 1, 2 * HALF + 1)
-    u, v = np.tile(side, len(side)), np.repeat(side, len(side))
-    weight = np.exp(-2 * (u * u + v * v))
-    pixels = grid.pixels.copy()
-    good = np.ones(len(pixels), bool)
-    for _ in range(12):
-        offsets = WINDOW * np.einsum("nij,kj->nki", local, np.stack([u, v], axis=-1))
-        patch = _sampled(smooth, pixels[:, None] + offsets).reshape(-1, len(side), len(side))
-        slopes = np.gradient(patch, side, side, axis=(1, 2))
-        gv, gu = (np.asarray(slope).reshape(len(pixels), -1) for slope in slopes)
-        a = np.sum(weight * gu * gu, axis=1)
-        b = np.sum(weight * gu * gv, axis=1)
-        c = np.sum(weight * gv * gv, axis=1)
-        p = np.sum(weight * (gu * gu * u + gu * gv * v), axis=1)
-        q = np.sum(weight * (gu * gv * u + gv * gv * v), axis=1)
-        determinant = a * c - b * b
-        good &= determinant > 1e-9 * np.maximum(a * c, 1e-9)
-        determinant = np.where(good, determinant, 1.0)
-        move = np.stack([(c * p - b * q) / determinant, (a * q - b * p) / determinant], axis=-1)
-        move = WINDOW * np.einsum("nij,nj->ni", local, move)
-        move[~good] = 0
-        pixels += move
-        if np.abs(move).max() < 1e-3:
-            break
-    strayed = np.linalg.norm(pixels - grid.pixels, axis=1)
-    good &= strayed < 0.4 * np.linalg.norm(local, axis=1).min(axis=1)
-    return Grid(grid.cells[good], pixels[good])
-
-
-def _local_steps(grid: Grid) -> Floats:
-    """(n, 2, 2): columns are the steps to the next corner along the grid's two axes, pixels."""
-    place = {(int(i), int(j)): at for (i, j), at in zip(grid.cells, grid.pixels, strict=True)}
-    usual = float(np.mean(np.ptp(grid.pixels, axis=0) / (np.ptp(grid.cells, axis=0) + 1)))
-    steps = np.empty((len(grid.cells), 2, 2))
-    for n, ((i, j), here) in enumerate(place.items()):
-        for axis, (di, dj) in enumerate(((1, 0), (0, 1))):
-            before, after = place.get((i - di, j - dj)), place.get((i + di, j + dj))
-            known = [] if before is None else [here - before]
-            known += [] if after is None else [after - here]
-            steps[n, :, axis] = np.mean(known, axis=0) if known else usual * np.eye(2)[axis]
-    return steps
