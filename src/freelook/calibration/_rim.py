@@ -11,7 +11,7 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 from ._ellipse import Ellipse, Floats
 
 RAYS = 720
-ANGLES: Floats = np.arange(RAYS) * (2 * np.pi / RAYS)
+ANGLES: Floats = np.asarray(np.arange(RAYS) * (2 * np.pi / RAYS), dtype=np.float64)
 PER_RAY = 5  # edges kept of each ray
 
 DIM = 8.0  # grey levels: steps in what is darker than this count little

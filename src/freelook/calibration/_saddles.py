@@ -161,7 +161,7 @@ def _grid_slopes(
     axes, bend = maps.axes[..., None], maps.bend[..., None]
     by_u = [axes[:, i, 0] + 2 * u * bend[:, i, 0] + v * bend[:, i, 1] for i in (0, 1)]
     by_v = [axes[:, i, 1] + u * bend[:, i, 1] + 2 * v * bend[:, i, 2] for i in (0, 1)]
-    return x * by_u[0] + y * by_u[1], x * by_v[0] + y * by_v[1]
+    return _float32(x * by_u[0] + y * by_u[1]), _float32(x * by_v[0] + y * by_v[1])
 
 
 def likeness(level: Pictures, maps: LocalMaps, size: float = 1.0) -> tuple[Floats, Floats]:
@@ -175,7 +175,7 @@ def likeness(level: Pictures, maps: LocalMaps, size: float = 1.0) -> tuple[Float
     clear = np.abs(np.sin(2 * AROUND)) > CLEAR_OF_EDGES
     u, v = (ring * np.cos(AROUND[clear])).ravel(), (ring * np.sin(AROUND[clear])).ravel()
     at = maps.pixels(u, v)
-    inside = ((at >= 0) & (at <= (columns - 1, rows - 1))).all(axis=-1)
+    inside = np.asarray(((at >= 0) & (at <= (columns - 1, rows - 1))).all(axis=-1), dtype=bool)
     values = sampled(level, np.where(inside[..., None], at, 0.0))
     ideal = np.sign(u * v)
     count = np.maximum(inside.sum(axis=1), 1)
