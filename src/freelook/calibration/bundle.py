@@ -217,14 +217,14 @@ def _robustly(problem: Problem, state: State, steps: int = STEPS) -> tuple[State
 
 def _cleaned(problem: Problem, state: State, steps: int) -> tuple[State, Floats]:
     """Plain least squares without the points that are too far off, until these stay the same."""
-    weights = np.ones(problem.count)
+    weights = _inliers(problem, state, np.ones(problem.count))
     for _ in range(6):
-        before, weights = weights, _inliers(problem, state, weights)
-        if np.array_equal(weights, before):
-            break
         fixed = weights
         state = _minimise(problem, state, lambda _, fixed=fixed: fixed, steps)  # type: ignore[misc]
-    return state, weights
+        weights = _inliers(problem, state, fixed)
+        if np.array_equal(weights, fixed):
+            break
+    return state, fixed
 
 
 def _inliers(problem: Problem, state: State, counted: Floats) -> Floats:
@@ -315,6 +315,13 @@ def adjusted(problem: Problem, state: State) -> Adjusted:
 
 
 def _known(problem: Problem, state: State, counted: Floats) -> Adjusted:
+    used = sum(bool(counted[part].any()) for part in problem.parts)
+    unknowns = len(state.values) + 6 * used
+    surplus = 2 * int(counted.sum()) - unknowns
+    if surplus < 1:
+        raise CalibrationError(
+            f"{int(counted.sum())} points are too few for {unknowns} unknowns; add views"
+        )
     residuals = problem.residuals(state)
     equations = Equations.of(problem, state, residuals, counted)
     if not (equations.sound and np.isfinite(residuals).all()):
@@ -330,13 +337,6 @@ def _known(problem: Problem, state: State, counted: Floats) -> Adjusted:
     condition = float(np.linalg.cond(each.sum(0))) if len(scale) else 1.0
     if not condition < WORST_CONDITION:
         raise CalibrationError(UNDETERMINED)
-    used = sum(bool(counted[part].any()) for part in problem.parts)
-    unknowns = len(state.values) + 6 * used
-    surplus = 2 * int(counted.sum()) - unknowns
-    if surplus < 1:
-        raise CalibrationError(
-            f"{int(counted.sum())} points are too few for {unknowns} unknowns; add views"
-        )
     variance = float(counted @ _squares(residuals)) / surplus
     inverse = np.linalg.inv(each.sum(0))
     together = _together(inverse, each, right * scale, variance)

@@ -7,18 +7,17 @@ enough? -> the wanted models from there, on the same points -> the best (see `ca
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..camera import Camera
 from ..errors import CalibrationError, FreelookError
-from ..lens import KannalaBrandt
 from .bundle import Solution, resect_all, solve
 from .candidates import AUTO, Candidate, Progress, check_model, chosen, tried
 from .doubts import check_enough, check_fit, doubts, typical_uncertainty
 from .field import seen_angle, with_field
-from .initial import Guess, first_guesses, mirrored, pose_of
+from .initial import as_kannala_brandt, first_guesses, mirrored, pose_of
 from .parameters import Freedom
 from .views import Pose, View, checked
 
@@ -124,7 +123,7 @@ def _base(views: list[View], size: tuple[int, int], freedom: Freedom) -> Solutio
     for guess in first_guesses(views, size):
         try:
             refined.append(
-                solve(_kannala_brandt(guess), guess.poses, few, freedom, steps=RACE_STEPS)
+                solve(as_kannala_brandt(guess.camera), guess.poses, few, freedom, steps=RACE_STEPS)
             )
         except FreelookError:
             continue
@@ -147,18 +146,6 @@ def _even(view: View, most: int) -> View:
         return view
     chosen = np.linspace(0, count - 1, most).astype(int)
     return View(view.name, view.points[chosen], view.pixels[chosen])
-
-
-def _kannala_brandt(guess: Guess) -> Camera:
-    """The guess as the Kannala-Brandt lens nearest to it, with a field that hinders nothing."""
-    lens = guess.camera.lens
-    theta = np.linspace(0, guess.camera.theta_max, 200)[1:]
-    powers = theta[:, None] ** np.array([1, 3, 5, 7, 9])
-    terms = np.linalg.lstsq(powers, lens.radius(theta), rcond=None)[0]
-    f = float(terms[0])
-    return replace(
-        guess.camera, lens=KannalaBrandt(f, *(float(k) / f for k in terms[1:])), theta_max=np.pi
-    )
 
 
 def _other_poses(solution: Solution, views: list[View]) -> tuple[list[Pose], bool]:

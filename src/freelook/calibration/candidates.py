@@ -23,10 +23,10 @@ from numpy.typing import NDArray
 from ..camera import Camera, make_camera
 from ..errors import CalibrationError, FreelookError
 from ..fitting.refit import refit
-from ..lens import MODELS, Lens, RadialSpline, growth_limit, vector
+from ..lens import MODELS, Lens, RadialSpline, growth_limit
 from .bundle import Solution, resect_all, rms, solve
 from .field import MARGIN, angles, seen_angle
-from .parameters import Freedom
+from .parameters import HELD, Freedom, lens_names
 from .views import View
 
 # Tried by `auto`, those with few parameters first; the others are for those who ask for them.
@@ -222,7 +222,7 @@ def _median_px(solution: Solution) -> float:
 
 def _parameters(candidate: Candidate) -> int:
     assert candidate.solution is not None
-    return len(vector(candidate.solution.camera.lens))
+    return len(lens_names(candidate.solution.camera.lens))
 
 
 def _start(name: str, base: Solution, seen: float, freedom: Freedom) -> Camera:
@@ -240,7 +240,8 @@ def _start(name: str, base: Solution, seen: float, freedom: Freedom) -> Camera:
     if name == "radial_spline":
         return replace(base.camera, lens=_spline_like(known.lens, grows))
     try:
-        near = refit(known, name, stretch="aspect" if freedom.aspect else "none").camera
+        stretch, held = "aspect" if freedom.aspect else "none", HELD.get(MODELS[name], ())
+        near = refit(known, name, stretch=stretch, held=held).camera
     except FreelookError:  # it may still be solved for, on the points
         f = float(base.camera.lens.radius(np.array([0.01]))[0] / 0.01)
         return replace(base.camera, lens=MODELS[name](f))  # type: ignore[call-arg]

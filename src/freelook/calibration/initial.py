@@ -10,14 +10,22 @@ of it, and keep what projects the points nearest to their pixels.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..camera import Camera, make_camera
-from ..lens import Equidistant, Equisolid, Floats, Lens, Perspective, Stereographic
+from ..lens import (
+    Equidistant,
+    Equisolid,
+    Floats,
+    KannalaBrandt,
+    Lens,
+    Perspective,
+    Stereographic,
+)
 from .views import Pose, View
 
 SHAPES: tuple[type[Lens], ...] = (Perspective, Stereographic, Equidistant, Equisolid)
@@ -47,6 +55,16 @@ def first_guesses(views: Sequence[View], size: tuple[int, int]) -> list[Guess]:
         scored += [(float(e), lens, center) for e, lens in zip(errors, lenses, strict=True)]
     scored.sort(key=lambda entry: entry[0])
     return [_guess(lens, center, views, size, error) for error, lens, center in _varied(scored)]
+
+
+def as_kannala_brandt(camera: Camera) -> Camera:
+    """With the Kannala-Brandt lens nearest to its own, and a field that hinders no solver."""
+    theta = np.linspace(0, camera.theta_max, 200)[1:]
+    powers = theta[:, None] ** np.array([1, 3, 5, 7, 9])
+    terms = np.linalg.lstsq(powers, camera.lens.radius(theta), rcond=None)[0]
+    f = float(terms[0])
+    lens = KannalaBrandt(f, *(float(k) / f for k in terms[1:]))
+    return replace(camera, lens=lens, theta_max=np.pi)
 
 
 def pose_of(camera: Camera, view: View) -> Pose | None:

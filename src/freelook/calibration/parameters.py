@@ -7,7 +7,14 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from ..camera import Camera
-from ..lens import Floats, Lens, vector, with_vector
+from ..lens import Floats, Lens, Mei, OpenCVRational, vector, with_vector
+
+# Parameters that stay as they are (0): views of a board do not tell them from the others. OpenCV
+# and Kalibr leave the same ones out unless asked.
+HELD: dict[type[Lens], tuple[str, ...]] = {
+    Mei: ("k3",),
+    OpenCVRational: ("s1", "s2", "s3", "s4", "tau_x", "tau_y"),
+}
 
 
 @dataclass(frozen=True)
@@ -42,7 +49,7 @@ class Parameters:
         free, camera = self.freedom, self.camera
         return np.array(
             [
-                *(vector(camera.lens) if free.lens else ()),
+                *(lens_values(camera.lens) if free.lens else ()),
                 *(camera.center if free.center else ()),
                 *((camera.stretch[1, 1],) if free.aspect else ()),
                 *((camera.stretch[0, 1],) if free.skew else ()),
@@ -54,8 +61,8 @@ class Parameters:
         free, lens = self.freedom, self.camera.lens
         left = list(map(float, values))
         if free.lens:
-            count = len(vector(lens))
-            lens, left = with_vector(lens, left[:count]), left[count:]
+            count = len(lens_names(lens))
+            lens, left = with_lens_values(lens, np.array(left[:count])), left[count:]
         center = (left.pop(0), left.pop(0)) if free.center else self.camera.center
         stretch = self.camera.stretch.copy()
         if free.aspect:
@@ -66,7 +73,28 @@ class Parameters:
 
 
 def lens_names(lens: Lens) -> tuple[str, ...]:
-    """Names of what `vector` holds; entries of lists are numbered, as in radii_px[2]."""
+    """Names of what is solved for; entries of lists are numbered, as in radii_px[2]."""
+    return tuple(name for name in _all_names(lens) if name not in HELD.get(type(lens), ()))
+
+
+def lens_values(lens: Lens) -> Floats:
+    """What is solved for, in the order of `lens_names`."""
+    return vector(lens)[_free(lens)]
+
+
+def with_lens_values(lens: Lens, values: Floats) -> Lens:
+    """The lens with other values; the reverse of `lens_values`."""
+    every = vector(lens)
+    every[_free(lens)] = values
+    return with_vector(lens, every)
+
+
+def _free(lens: Lens) -> list[int]:
+    held = HELD.get(type(lens), ())
+    return [i for i, name in enumerate(_all_names(lens)) if name not in held]
+
+
+def _all_names(lens: Lens) -> list[str]:
     names: list[str] = []
     for field in fields(lens):  # type: ignore[arg-type]
         value = getattr(lens, field.name)
@@ -76,7 +104,7 @@ def lens_names(lens: Lens) -> tuple[str, ...]:
             names += [f"{field.name}[{i}]" for i in range(len(value))]
         else:
             names.append(field.name)
-    return tuple(names)
+    return names
 
 
 def difference_step(value: float) -> float:

@@ -13,8 +13,8 @@ from functools import cache
 import numpy as np
 
 from ..camera import Camera
-from ..lens import Floats, Lens, image_point, radius_slope, vector, with_vector
-from .parameters import Parameters, difference_step
+from ..lens import Floats, Lens, image_point, radius_slope
+from .parameters import Parameters, difference_step, lens_values, with_lens_values
 
 INSIDE = 1 - 1e-6  # of the angle where a formula ends
 
@@ -93,11 +93,11 @@ def _lands(lens: Lens, bent: bool, polar: _Polar) -> Floats:
 
 def _lens_slopes(lens: Lens, bent: bool, polar: _Polar) -> list[Floats]:
     """d (landing place) / d (parameter) (n, 2), for each parameter of the lens."""
-    values, slopes = vector(lens), []
+    values, slopes = lens_values(lens), []
     for i, value in enumerate(values):
         step = np.zeros(len(values))
         step[i] = difference_step(value)
-        ahead, behind = with_vector(lens, values + step), with_vector(lens, values - step)
+        ahead, behind = with_lens_values(lens, values + step), with_lens_values(lens, values - step)
         change = _lands(ahead, bent, polar) - _lands(behind, bent, polar)
         slopes.append(change / (2 * step[i]))
     return slopes
