@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from boards import BOARD, field_camera, truth, views_of
 from scipy.spatial.transform import Rotation
 
-from boards import BOARD, field_camera, truth, views_of
 from freelook.calibration.bundle import Solution, resect, resect_all, rms, solve
 from freelook.calibration.parameters import (
     HELD,
