@@ -1,6 +1,5 @@
-"""Calibrate a camera from pictures of a chessboard or another target, beyond 90 degrees too.
+"""Calibrate a camera from pictures of a chessboard, beyond 90 degrees too.
 
-  freelook calibrate board --target chessboard --board 9x6 -o board.pdf     print a board
   freelook calibrate shots/*.jpg -o lens.json                               size found by itself
   freelook calibrate shots/*.jpg --board 6x8 --square 0.0325 -o lens.json --report report.html
   freelook calibrate board.mp4 --model auto -o lens.json                    from a video
