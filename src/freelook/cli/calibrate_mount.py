@@ -161,8 +161,8 @@ def read_attitudes(name: str) -> list[tuple[str | None, Attitude]]:
     except (OSError, UnicodeDecodeError) as error:
         raise FreelookError(f"{name}: {getattr(error, 'strerror', 'not a text file')}") from None
     rows = list(csv.DictReader(text.splitlines(), skipinitialspace=True))
-    columns = set(rows[0]) if rows else set()
-    if not (columns.issuperset(ANGLES) or columns.issuperset(QUATERNION)):
+    columns = list(rows[0]) if rows else []
+    if not ({*ANGLES} <= {*columns} or {*QUATERNION} <= {*columns}):
         raise FreelookError(
             f"{name}: a first line with the columns name, roll_deg, pitch_deg (or qw, qx, qy, qz) "
             f"and rows below it are needed; there are: {', '.join(map(str, columns)) or 'none'}"
