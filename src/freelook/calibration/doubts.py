@@ -24,6 +24,7 @@ TOO_UNSURE, UNSURE = 0.01, 0.0025
 NO_FIT, POOR_FIT = 0.004, 0.001
 ALIKE_DEG, ALIKE_SHARE = 5.0, 0.1
 SMALL_SHARE = 0.1
+MANY_DROPPED = 0.1
 
 
 def check_fit(solution: Solution) -> None:
@@ -47,7 +48,8 @@ def check_enough(solution: Solution, views: Sequence[View], freedom: Freedom) ->
             f"all {len(views)} views show the board in the same place and tilt; move it between "
             "pictures: to the middle and all around the rim, near and far, straight and tilted"
         )
-    unsure = typical_uncertainty(solution, views, freedom)
+    # with independent errors: views that contradict each other are another matter
+    unsure = typical_uncertainty(solution, views, freedom) / solution.together
     if unsure <= TOO_UNSURE * max(solution.camera.size):
         return
     tilted = tilts_deg(solution, views).max()
@@ -55,8 +57,8 @@ def check_enough(solution: Solution, views: Sequence[View], freedom: Freedom) ->
         f"the board is never tilted by more than {tilted:.0f} degrees, so that a near board and a "
         "long lens look alike; tilt it by 20 to 50 degrees in some pictures"
         if tilted < 15
-        else f"all corners lie within {covered_share(views, solution):.0%} of the picture; hold "
-        "the board nearer and all around the rim"
+        else f"all corners lie within {percent(covered_share(views, solution))} of the picture; "
+        "hold the board nearer and all around the rim"
         if covered_share(views, solution) < SMALL_SHARE
         else "take more views, with the board tilted, near the rim and at other distances"
     )
@@ -74,6 +76,12 @@ def doubts(solution: Solution, views: Sequence[View], unsure_px: float) -> tuple
             f"corners are off by {solution.noise_px:.1f} px, which is much: is the board flat, the "
             "picture sharp, and is it always the same board?"
         )
+    every = np.concatenate(solution.inliers)
+    if (share := 1 - float(every.mean())) > MANY_DROPPED:
+        found.append(
+            f"{percent(share)} of the corners fit nothing: are all pictures by one camera at one "
+            "zoom, and of one board?"
+        )
     if unsure_px > UNSURE * side:
         found.append(
             f"the projection is only known to {unsure_px:.1f} px where corners were seen: add "
@@ -81,11 +89,15 @@ def doubts(solution: Solution, views: Sequence[View], unsure_px: float) -> tuple
         )
     if (share := covered_share(views, solution)) < SMALL_SHARE:
         found.append(
-            f"all corners lie within {share:.0%} of the picture: nothing is known of the rest"
+            f"all corners lie within {percent(share)} of the picture: nothing is known of the rest"
         )
     if len(views) < 3:
         found.append("two views only: nothing is left to test the result on; take at least 5")
     return tuple(found)
+
+
+def percent(share: float) -> str:
+    return f"{max(share, 0.01):.0%}"
 
 
 def typical_uncertainty(solution: Solution, views: Sequence[View], freedom: Freedom) -> float:

@@ -97,8 +97,8 @@ def sentences(calibration: Calibration) -> list[str]:
         lines.append(
             "errors of neighbouring corners go together: the views disagree "
             f"{solution.together:.1f} times as much as single errors would make them, which is "
-            "taken into account; a board that is not quite flat, or pictures taken in motion, are "
-            "the usual reasons"
+            "taken into account; usual reasons are a board that is not quite flat, pictures taken "
+            "in motion, and more than one camera or zoom"
         )
     lines += [f"weak: {doubt}" for doubt in calibration.doubts]
     if calibration.rejected:
