@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import socket
 import urllib.request
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,12 @@ from commands import running, stop
 
 from freelook.cli import main
 from freelook.datagrams import free_port
+
+
+def status_of(arguments: list[str]) -> int:
+    """In a thread of its own: Playwright's event loop, once started, stays in the tests' thread."""
+    with ThreadPoolExecutor(1) as pool:
+        return pool.submit(main, arguments).result()
 
 
 def test_fly_serves_its_page_and_ends_with_ctrl_c() -> None:
@@ -65,7 +72,7 @@ def test_what_is_wrong_is_said(
     arguments: list[str], why: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     port = [] if "--port" in arguments else ["--port", "0"]
-    assert main([*arguments, *port, "--no-browser"]) == 2
+    assert status_of([*arguments, *port, "--no-browser"]) == 2
     out, err = capsys.readouterr()
     assert err.startswith("freelook fly: ")
     assert why in err
@@ -75,7 +82,7 @@ def test_what_is_wrong_is_said(
 def test_a_port_in_use_is_said(capsys: pytest.CaptureFixture[str]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        assert main(["fly", RTP, "--lens", "demo", "--port", str(port), "--no-browser"]) == 2
+        assert status_of(["fly", RTP, "--lens", "demo", "--port", str(port), "--no-browser"]) == 2
     assert f"port {port} on 127.0.0.1 is in use" in capsys.readouterr().err
 
 
