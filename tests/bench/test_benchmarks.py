@@ -75,6 +75,6 @@ def test_a_figure_without_values_is_not_a_number() -> None:
 
 def test_stamped_pictures_are_decoded_soon() -> None:
     """Only that the path works: the stamps are read, and lie in the past."""
-    figure = video_latency.ours(seconds=2.0)
-    assert len(figure.values_ms) > 5
+    figure = video_latency.ours(seconds=0.5)
+    assert len(figure.values_ms) >= 15
     assert all(0 < value < 5000 for value in figure.values_ms)
