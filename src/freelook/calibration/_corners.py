@@ -11,11 +11,10 @@ from dataclasses import dataclass, field
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..lens import Floats
+from ._growing import largest_grid, mutual
 from ._lattice import Cells, Lattice, LocalMaps, in_squares
 from ._saddles import Gray, Pictures, sampled
 
@@ -27,7 +26,6 @@ NEIGHBOURS = 20  # among which the next corner along an edge is looked for
 STRAIGHT = 0.94  # cosine of how far beside the edge it may be
 SEARCH = 0.33  # of a square: how far from its expected place a corner may be
 TURNED = 0.6  # radians: how far its edges may be turned from the grid's
-SEEDS = 5
 
 
 @dataclass(frozen=True)
@@ -98,32 +96,20 @@ def _edges(values: Floats) -> Floats:
     return angles
 
 
-def largest_grid(corners: Corners) -> Lattice | None:
+def grid_of(corners: Corners) -> Lattice | None:
     """The largest grid that grows from the best linked corners; None if nothing grows."""
-    if len(corners.pixels) < 3:
+    if len(corners.pixels) < 4:
         return None
-    links = _links(corners)
-    best: Lattice | None = None
-    taken = np.zeros(len(corners.pixels), bool)
-    for seed in _seeds(corners, links):
-        if taken[seed]:
-            continue
-        lattice = _started(corners, seed, links[seed])
-        if lattice is None:
-            continue
-        growth = _Growth(corners)
-        lattice.grow(growth)
-        taken |= growth.used
-        if best is None or len(lattice) > len(best):
-            best = lattice
-    return best
+    links = mutual(_links(corners))
+
+    def start(seed: int) -> Lattice:
+        return _started(corners, seed, links[seed])
+
+    return largest_grid(links, corners.contrast, start, lambda: _Growth(corners))
 
 
 def _links(corners: Corners) -> Cells:
-    """(n, 4): the next corner along each edge (forth and back along the first, the second), or -1.
-
-    Only pairs that name each other count.
-    """
+    """(n, 4): the next corners along one edge, forth and back, and along the other; or -1."""
     count = len(corners.pixels)
     distance, near = corners.tree.query(corners.pixels, k=min(NEIGHBOURS, count))
     offset = corners.pixels[near] - corners.pixels[:, None]
@@ -137,32 +123,15 @@ def _links(corners: Corners) -> Cells:
         fits = swapped & (np.einsum("nkc,nc->nk", offset, way) > STRAIGHT * distance)
         first = np.argmax(fits, axis=1)
         links[:, k] = np.where(fits.any(axis=1), near[np.arange(count), first], -1)
-    back = (links[links] == np.arange(count)[:, None, None]).any(axis=-1)
-    return np.where((links >= 0) & back, links, -1)
+    return links
 
 
-def _seeds(corners: Corners, links: Cells) -> list[int]:
-    """The best linked corner of each of the largest groups, and its next best."""
-    count = len(links)
-    row, column = np.nonzero(links >= 0)
-    pairs = coo_array((np.ones(len(row)), (row, links[row, column])), shape=(count, count))
-    _, group = connected_components(pairs, directed=False)
-    members = np.bincount(group)[group]
-    degree = (links >= 0).sum(axis=1)
-    order = np.lexsort([-corners.contrast, -degree, -members])
-    _, first = np.unique(group[order], return_index=True)
-    best = order[np.sort(first)][:SEEDS]
-    return [int(i) for i in best if members[i] > 3]
-
-
-def _started(corners: Corners, seed: int, links: Cells) -> Lattice | None:
+def _started(corners: Corners, seed: int, links: Cells) -> Lattice:
     """The seed and its neighbours, the second axis clockwise (y down) of the first."""
     first, second = (np.array([np.cos(a), np.sin(a)]) for a in corners.angles[seed])
     flip = 1 if first[0] * second[1] - first[1] * second[0] > 0 else -1
     steps = np.array([[1, 0], [-1, 0], [0, flip], [0, -flip]])
     there = links >= 0
-    if not (there[:2].any() and there[2:].any()):
-        return None
     lattice = Lattice()
     lattice.put(np.zeros((1, 2), np.int64), corners.pixels[[seed]])
     lattice.put(steps[there], corners.pixels[links[there]])

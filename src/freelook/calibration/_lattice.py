@@ -31,9 +31,16 @@ ACROSS = np.arange(-REACH, REACH + 1)
 OFFSETS = np.stack(np.meshgrid(ACROSS, ACROSS), axis=-1).reshape(-1, 2)
 OWN = (OFFSETS == 0).all(axis=1)
 WEIGHTS = np.exp(-(OFFSETS**2).sum(axis=1) / WIDE**2)
-U, V = OFFSETS.T.astype(np.float64)
-TERMS = np.stack([np.ones(len(U)), U, V, U * U, U * V, V * V], axis=-1)
 RIDGE = np.diag([1e-9, 1e-6, 1e-6, STIFF, STIFF, STIFF])
+
+
+def _terms(offsets: Floats) -> Floats:
+    """(..., 6): 1, u, v, u u, u v, v v of offsets (..., 2)."""
+    u, v = offsets[..., 0], offsets[..., 1]
+    return np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], axis=-1)
+
+
+TERMS = _terms(OFFSETS.astype(np.float64))
 
 
 @dataclass(frozen=True)
@@ -119,12 +126,9 @@ class Lattice:
         there = np.isfinite(near[..., 0]) & (own | ~OWN)
         weights = np.where(there, WEIGHTS, 0.0)
         near = np.where(there[..., None], near, 0.0)
-        normal = np.einsum("nk,ki,kj->nij", weights, TERMS, TERMS) + RIDGE
+        normal = np.einsum("nk,ki,kj->nij", weights, TERMS, TERMS)
         right = np.einsum("nk,ki,nkc->nic", weights, TERMS, near)
-        solved = np.linalg.solve(normal, right).transpose(0, 2, 1)
-        linear = normal[:, :3, :3]
-        known = (there.sum(axis=1) >= FEWEST_AROUND) & (np.linalg.det(linear) > 1e-3)
-        return LocalMaps(solved[..., 0], solved[..., 1:3], solved[..., 3:], known)
+        return _solved(normal, right, there.sum(axis=1))
 
     def grow(self, find: Finder) -> None:
         """Add what `find` finds beside what is known, round by round, until nothing is added."""
@@ -160,6 +164,27 @@ class Lattice:
             if not (thin & known).any():
                 return
             self._at[thin] = np.nan
+
+
+def maps_at(where: Floats, points: Floats, pixels: Floats, *, own: bool = False) -> LocalMaps:
+    """As `Lattice.maps`, from points anywhere: at `where` (n, 2), both in units of a square.
+
+    A point that is exactly there counts only with `own`.
+    """
+    offsets = points - where[:, None]
+    distance = np.abs(offsets).max(axis=-1)
+    near = (distance <= REACH) & (own | (distance > 1e-9))
+    weights = np.exp(-np.minimum((offsets**2).sum(axis=-1) / WIDE**2, 50.0)) * near
+    terms = _terms(np.where(near[..., None], offsets, 0.0))
+    normal: Floats = np.einsum("nk,nki,nkj->nij", weights, terms, terms)
+    right: Floats = np.einsum("nk,nki,kc->nic", weights, terms, pixels)
+    return _solved(normal, right, near.sum(axis=1))
+
+
+def _solved(normal: Floats, right: Floats, around: Cells) -> LocalMaps:
+    known = (around >= FEWEST_AROUND) & (np.linalg.det(normal[:, :3, :3]) > 1e-3)
+    solved = np.asarray(np.linalg.solve(normal + RIDGE, right).transpose(0, 2, 1), np.float64)
+    return LocalMaps(solved[..., 0], solved[..., 1:3], solved[..., 3:], known)
 
 
 def in_squares(axes: Floats, offsets: Floats) -> Floats:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..lens import Floats
-from ._corners import SEARCH, find_corners, largest_grid
+from ._corners import SEARCH, find_corners, grid_of
 from ._lattice import Bools, Cells, Lattice, LocalMaps, in_squares
 from ._saddles import LIKE, Gray, Slopes, Window, edge_blur_px, likeness, placed
 
@@ -89,7 +89,7 @@ def _worthwhile(level: Gray, gray: Gray, found: Lattice | None) -> bool:
 
 def _board(level: Gray) -> Lattice | None:
     """The largest board in one size of the picture."""
-    lattice = largest_grid(find_corners(level))
+    lattice = grid_of(find_corners(level))
     if lattice is None or len(lattice) < FEWEST:
         return None
     slopes = Slopes.of(level)

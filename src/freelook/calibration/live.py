@@ -20,7 +20,7 @@ from .live_coverage import Sectors
 from .live_guidance import Guide, Hold
 from .live_sharpness import Sharpness, Steadiness, edge_width_px
 from .parameters import Freedom
-from .targets import Gray, Target
+from .targets import Finder, Gray
 from .uncertainty import grid_of, projection_uncertainty
 from .views import FEWEST_POINTS, View
 
@@ -100,7 +100,7 @@ class LiveCalibration:
     Not safe between threads: one of them does everything.
     """
 
-    def __init__(self, target: Target) -> None:
+    def __init__(self, target: Finder) -> None:
         self._target = target
         self.restart()
 
@@ -247,7 +247,7 @@ def _scale(gray: Gray) -> float:
     return min(1.0, FOLLOWED_PX / max(gray.shape))
 
 
-def _followed(target: Target, gray: Gray, name: str) -> View | None:
+def _followed(target: Finder, gray: Gray, name: str) -> View | None:
     """The target in a picture that is not too large to be searched many times a second."""
     scale = _scale(gray)
     if scale == 1:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from ..calibration.calibrate import Calibration
 from ..calibration.live import Progress
 from ..calibration.parameters import Freedom
-from ..calibration.targets import Gray, Target
+from ..calibration.targets import Finder, Gray
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Plan:
     """What is calibrated and how; `save` is called with the result, on the solving thread."""
 
     source: str
-    target: Target
+    target: Finder
     save: Callable[[Result], Saved]
     model: str = "auto"
     freedom: Freedom = field(default_factory=Freedom)

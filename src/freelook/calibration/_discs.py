@@ -1,0 +1,73 @@
+"""Where the centres of circles are seen, to a fraction of a pixel."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..lens import Floats
+from ._blobs import LEAST, Blobs
+from ._lattice import Lattice
+from ._saddles import Gray
+
+CROWDED = 0.1  # of what is around a blob may be dark
+HALO = 1.7  # radii around a blob that its middle is weighed from
+
+
+def weighed(gray: Gray, blobs: Blobs) -> Blobs:
+    """The blobs with middle and area weighed by how much darker they are than what is around.
+
+    Blur moves no darkness sideways and loses none, so that both stay what they are. Without those
+    that have other dark things near them.
+    """
+    parts = [_weighed(gray, *one) for one in zip(blobs.pixels, blobs.spread, strict=True)]
+    good = np.array([part is not None for part in parts], dtype=bool)
+    pixels = np.array([part[0] for part in parts if part is not None]).reshape(-1, 2)
+    area = np.array([part[1] for part in parts if part is not None])
+    spread = blobs.spread[good] * (area / blobs.area[good])[:, None, None]
+    return Blobs(pixels, spread)
+
+
+def _weighed(gray: Gray, at: Floats, spread: Floats) -> tuple[Floats, float] | None:
+    reach = HALO * 2 * np.sqrt(np.diag(spread)) + 1.5
+    left, top = np.floor(at - reach).astype(int)
+    right, bottom = np.ceil(at + reach).astype(int) + 1
+    if left < 0 or top < 0 or right > gray.shape[1] or bottom > gray.shape[0]:
+        return None
+    patch = gray[top:bottom, left:right].astype(np.float64)
+    y, x = np.mgrid[top:bottom, left:right]
+    offset = np.stack([x - at[0], y - at[1]], axis=-1)
+    inverse = np.linalg.inv(4 * spread + 0.1 * np.eye(2))
+    far = np.sqrt(np.einsum("...i,ij,...j", offset, inverse, offset))
+    inner, outer = far < 0.7, (far > 1.35) & (far < HALO)
+    if inner.sum() < 1 or outer.sum() < 4:
+        return None
+    light, dark = float(np.median(patch[outer])), float(np.median(patch[inner]))
+    darkness = (light - patch) / max(light - dark, 1e-9)
+    if light - dark < LEAST or (darkness[outer] > 0.5).mean() > CROWDED:
+        return None
+    weight = np.clip(darkness, 0, 1) * (far < HALO)
+    area = float(weight.sum())
+    return np.array([np.sum(weight * x), np.sum(weight * y)]) / area, area
+
+
+def centres(blobs: Blobs, lattice: Lattice) -> Floats:
+    """(n, 2) for the lattice's cells: where the centres are seen, beside the middles of the blobs.
+
+    Within a circle the local map is quadratic: a point u of its disc, of radius q squares, is seen
+    at p + A u + B(u, u), and weighs by the area that is seen of it, det A (1 + g u). The mean of
+    u u' over a disc is q q / 4, so that the middle of the blob lies (q q / 4) (B(e1, e1) +
+    B(e2, e2) + A g) beside p.
+    """
+    cells = lattice.cells()
+    pixels = lattice.pixels(cells)
+    maps = lattice.maps(cells, own=True)
+    _, which = blobs.tree.query(pixels)
+    uu, uv, vv = (maps.bend[..., k] for k in range(3))
+    inverse = np.linalg.inv(maps.axes)
+    by_u, by_v = np.stack([2 * uu, uv], axis=-1), np.stack([uv, 2 * vv], axis=-1)
+    growth = np.stack(
+        [np.einsum("nij,nji->n", inverse, by_u), np.einsum("nij,nji->n", inverse, by_v)], axis=-1
+    )
+    squared = blobs.area[which] / (np.pi * np.abs(np.linalg.det(maps.axes)))
+    beside = uu + vv + np.einsum("nij,nj->ni", maps.axes, growth)
+    return np.asarray(pixels - squared[:, None] / 4 * beside)

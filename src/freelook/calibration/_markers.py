@@ -1,0 +1,160 @@
+"""Corners of boards with numbered markers: the markers say which corner is where.
+
+    markers found and read by OpenCV -> where the board's corners should be -> corners placed to a
+    fraction of a pixel, checked by their looks -> those beside them, until nothing is added
+
+A marker too bent or too small to be read costs nothing as long as others are near.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import CalibrationError
+from ..lens import Floats
+from ._lattice import Bools, LocalMaps, in_squares, maps_at
+from ._saddles import Gray, Slopes, Window, likeness, placed
+
+STRAY = 0.5  # of a square: how far a marker may be from where the others expect it
+ENOUGH = 0.6  # of the markers: the corners between them are found without the others
+DOUBLED = 2_000_000  # pixels: pictures up to that are looked at enlarged too, others made small
+LIKE = 0.65  # correlation with the ideal corner; which corner it is, markers say
+RINGS_REACH = 0.34  # of what `likeness` looks at
+DICTIONARIES = {
+    name.removeprefix("DICT_").lower(): getattr(cv2.aruco, name)
+    for name in dir(cv2.aruco)
+    if name.startswith("DICT_")
+}
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a board with markers consists of, in units of `pitch`, any flat coordinates.
+
+    markers  (m, 4, 2) the corners of marker number i, in the order OpenCV gives them
+    corners  (n, 2) where dark and light squares meet
+    signs    (n,) 1 if the squares with u v > 0 are the light ones, else -1
+    clear    radius around a corner in which there is nothing else
+    search   how far from its expected place a corner may be
+    """
+
+    markers: Floats
+    corners: Floats
+    signs: Floats
+    clear: float
+    search: float
+
+    @property
+    def window(self) -> Window:
+        """What a corner is placed by; where that is a few pixels only, a little more."""
+        return Window(self.clear, most=1.4 * self.clear)
+
+
+def dictionary(name: str) -> cv2.aruco.Dictionary:
+    """OpenCV's dictionary of that name, such as 4x4_50; CalibrationError lists the known."""
+    if name.lower() not in DICTIONARIES:
+        known = ", ".join(DICTIONARIES)
+        raise CalibrationError(f"unknown marker dictionary '{name}'; known: {known}")
+    return cv2.aruco.getPredefinedDictionary(DICTIONARIES[name.lower()])
+
+
+def marker_bits(name: str, number: int, border: int = 1) -> NDArray[np.bool_]:
+    """A marker's squares, border and all, as OpenCV draws it: True is dark."""
+    kind = dictionary(name)
+    side = kind.markerSize + 2 * border
+    return np.asarray(cv2.aruco.generateImageMarker(kind, number, side, borderBits=border)) == 0
+
+
+def find_markers(
+    gray: Gray, name: str, expected: int, border: int = 1
+) -> tuple[NDArray[np.int64], Floats]:
+    """Numbers (m,) and corners (m, 4, 2) of the markers of a dictionary in a picture.
+
+    When few of the `expected` ones are found, at another size of the picture too.
+    """
+    parameters = cv2.aruco.DetectorParameters()
+    parameters.markerBorderBits = border
+    parameters.adaptiveThreshWinSizeMax = 53
+    parameters.minMarkerPerimeterRate = 0.01
+    parameters.polygonalApproxAccuracyRate = 0.05  # sides are bent
+    parameters.perspectiveRemovePixelPerCell = 8
+    parameters.errorCorrectionRate = 1.0  # what is misread is far from where others expect it
+    detector = cv2.aruco.ArucoDetector(dictionary(name), parameters)
+    seen: dict[int, Floats] = {}
+    for scale in (1.0, 2.0 if gray.size <= DOUBLED else 0.5):
+        if len(seen) > ENOUGH * expected:
+            break
+        how = cv2.INTER_CUBIC if scale > 1 else cv2.INTER_AREA
+        level = cv2.resize(gray, None, fx=scale, fy=scale, interpolation=how)
+        corners, numbers, _ = detector.detectMarkers(level)
+        for number, at in zip(() if numbers is None else numbers.ravel(), corners, strict=True):
+            place = (at.reshape(4, 2).astype(np.float64) + 0.5) / scale - 0.5
+            seen.setdefault(int(number), place)
+    if not seen:
+        return np.empty(0, np.int64), np.empty((0, 4, 2))
+    return np.array(list(seen)), np.array(list(seen.values()))
+
+
+def find_corners(
+    gray: Gray, plan: Plan, numbers: NDArray[np.int64], seen: Floats
+) -> tuple[NDArray[np.int64], Floats]:
+    """Which of the plan's corners are in the picture, and where (n, 2), from markers seen."""
+    known = numbers < len(plan.markers)
+    markers, seen = plan.markers[numbers[known]], seen[known]
+    good = _without_strays(markers.mean(axis=1), seen.mean(axis=1))
+    points, pixels = markers[good].reshape(-1, 2), seen[good].reshape(-1, 2)
+    slopes = Slopes.of(gray)
+    at = np.full((len(plan.corners), 2), np.nan)
+    missing = np.arange(len(at))
+    while len(points) and len(missing):
+        maps = maps_at(plan.corners[missing], points, pixels)
+        places = _placed(slopes, plan, missing[maps.known], maps.part(maps.known))
+        found = np.isfinite(places[:, 0])
+        new = missing[maps.known][found]
+        at[new] = places[found]
+        if not len(new):
+            break
+        points = np.concatenate([points, plan.corners[new]])
+        pixels = np.concatenate([pixels, places[found]])
+        missing = np.setdiff1d(missing, new)
+    return _once_more(slopes, plan, at)
+
+
+def _placed(slopes: Slopes, plan: Plan, which: NDArray[np.int64], maps: LocalMaps) -> Floats:
+    """Places (n, 2) of corners near where they are expected; NaN where they are not."""
+    at, good = placed(slopes, maps.place, maps, plan.window)
+    good &= in_squares(maps.axes, at - maps.place) < plan.search
+    here = LocalMaps(np.where(good[:, None], at, maps.place), maps.axes, maps.bend, maps.known)
+    alike, _ = likeness(slopes.level, here, 0.9 * plan.clear / RINGS_REACH)
+    good &= plan.signs[which] * alike > LIKE
+    return np.where(good[:, None], at, np.nan)
+
+
+def _once_more(slopes: Slopes, plan: Plan, at: Floats) -> tuple[NDArray[np.int64], Floats]:
+    """Placed again by windows that follow the corners themselves, not the markers' rough ones."""
+    found = np.flatnonzero(np.isfinite(at[:, 0]))
+    if not len(found):
+        return found, np.empty((0, 2))
+    maps = maps_at(plan.corners[found], plan.corners[found], at[found])
+    found = found[maps.known & (in_squares(maps.axes, at[found] - maps.place) < plan.search)]
+    maps = maps_at(plan.corners[found], plan.corners[found], at[found], own=True)
+    maps = LocalMaps(at[found], maps.axes, maps.bend, maps.known)
+    fine = _placed(slopes, plan, found[maps.known], maps.part(maps.known))
+    good = np.isfinite(fine[:, 0])
+    return found[maps.known][good], fine[good]
+
+
+def _without_strays(points: Floats, pixels: Floats) -> Bools:
+    """Which of the markers (their middles) are about where the others expect them."""
+    good = np.ones(len(points), bool)
+    for _ in range(3):
+        maps = maps_at(points, points[good], pixels[good])
+        stray = maps.known & (in_squares(maps.axes, pixels - maps.place) > STRAY)
+        if not (stray & good).any():
+            break
+        good &= ~stray
+    return good
