@@ -13,7 +13,7 @@ PACKAGE = Path(freelook.__file__).parent
 
 LAYERS: list[set[str]] = [
     {"types", "errors", "clock"},
-    {"lens", "camera", "viewport", "rotations", "mailbox", "axes", "pose_script"}
+    {"lens", "camera", "viewport", "rotations", "mailbox", "axes", "pose_script", "attitude"}
     | {"color", "datagrams", "latency", "plugins"},
     {"renderers", "gimbal", "simulation", "media", "fitting", "plots", "calibration"}
     | {"resolution", "view_cost", "comparison"},

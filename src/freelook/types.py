@@ -94,6 +94,15 @@ class Pose:
     t_ns: int
 
 
+@dataclass(frozen=True, slots=True)
+class Attitude:
+    """How the vehicle is turned at one instant: body (forward, right, down) axes to north, east,
+    down."""
+
+    t_ns: int
+    world_from_body: Rotation
+
+
 @dataclass(slots=True)
 class Counters:
     """What went by and what went wrong; shown to the user. Names are free, values only grow."""
@@ -136,6 +145,26 @@ class Tracker(Protocol):
     def message(self) -> str: ...
 
     def poses(self) -> Iterator[Pose]: ...
+
+    def close(self) -> None: ...
+
+
+class AttitudeSource(Protocol):
+    """Something that knows how the vehicle is turned.
+
+    `attitudes` blocks and yields every attitude there is, none left out (they are interpolated,
+    `freelook.attitude`), times growing; it ends at the end of a log or after `close`, which may
+    be called from any thread. A log's times are those of its own clock, a live source's those of
+    the local one, of the measurement as far as the source can know. Bad input is counted, never
+    raised. `message` says what it is waiting for, to be shown while no attitude comes.
+    """
+
+    counters: Counters
+
+    @property
+    def message(self) -> str: ...
+
+    def attitudes(self) -> Iterator[Attitude]: ...
 
     def close(self) -> None: ...
 
