@@ -1,4 +1,4 @@
-"""Measure this machine: `bench render` (cost of a view) and `bench latency` (head to picture).
+"""Measure this machine: the cost of a view, head to picture, calibration beside others.
 
 Everything is measured side by side in one run with what you might use instead; what is not
 installed is named as skipped.
@@ -6,6 +6,7 @@ installed is named as skipped.
   freelook bench render                  the two standard cases on all cores
   freelook bench render --threads 1      on one core
   freelook bench latency                 needs a browser; takes about a minute
+  freelook bench calibrate --data FOLDER beside OpenCV and mrcal; mrcal takes minutes
 """
 
 from __future__ import annotations
@@ -14,9 +15,14 @@ import argparse
 import json
 import os
 import sys
+from math import isfinite
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..errors import FreelookError
+
 if TYPE_CHECKING:
+    from ..bench.calibrate import Row
     from ..bench.figures import Figure
     from ..bench.render import Timing
 
@@ -34,6 +40,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     latency.add_argument("--seconds", type=float, default=10.0, metavar="S", help="for each part")
     latency.add_argument("--json", action="store_true", help="print the figures as JSON")
     latency.set_defaults(bench=_latency)
+    calibrate = what.add_parser("calibrate", help="lenses from corners, beside OpenCV and mrcal")
+    calibrate.add_argument(
+        "--data", metavar="FOLDER", help="with the real sets fish_1 and ov_plane, if you have them"
+    )
+    calibrate.add_argument(
+        "--quick",
+        action="store_true",
+        help="without cross-validation: five solutions less",
+    )
+    calibrate.add_argument("--json", action="store_true", help="print the figures as JSON")
+    calibrate.set_defaults(bench=_calibrate)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -85,6 +102,61 @@ def _figures(timing: Timing, ours: Timing) -> dict[str, Any]:
         "p95_ms": timing.percentile_ms(95),
         "times_ours": median / ours.percentile_ms(50),
     }
+
+
+def _calibrate(args: argparse.Namespace) -> int:
+    from ..bench.calibrate import real_sets, run, simulated_sets
+
+    sets = simulated_sets()
+    if args.data:
+        print(f"looking for real sets in {args.data} ...", file=sys.stderr)
+        if not (real := real_sets(Path(args.data))):
+            raise FreelookError(f"{args.data} has neither fish_1/*.jpg nor ov_plane/train/*.orpc")
+        sets = real + sets
+    say = (lambda _: None) if args.json else (lambda what: print(what, file=sys.stderr))
+    rows = list(run(sets, cross_validate=not args.quick, progress=say))
+    if args.json:
+        print(json.dumps([_calibration_figures(row) for row in rows], indent=2))
+    else:
+        _print_calibrations(rows)
+        if not args.data:
+            print("fish_1, ov_plane: skipped: --data FOLDER says where they are")
+    return 0
+
+
+def _calibration_figures(row: Row) -> dict[str, Any]:
+    """For JSON, which has no NaN."""
+    figures: dict[str, Any] = {"set": row.set, "way": row.way}
+    for key in ("skipped", "failed"):
+        if said := getattr(row, key):
+            return {**figures, key: said}
+    for key in ("rms_px", "cross_validated_px", "seconds"):
+        value = float(getattr(row, key))
+        figures[key] = value if isfinite(value) else None
+    return figures
+
+
+def _print_calibrations(rows: list[Row]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    for name in dict.fromkeys(row.set for row in rows):
+        table = Table(title=name)
+        table.add_column("way")
+        for column in ("RMS px", "on views left out, px", "seconds"):
+            table.add_column(column, justify="right")
+        for row in rows:
+            if row.set != name:
+                continue
+            if row.skipped or row.failed:
+                said = f"skipped: {row.skipped}" if row.skipped else f"failed: {row.failed}"
+                table.add_row(f"{row.way}\n  {said}", "", "", "")
+            else:
+                predicted = row.cross_validated_px
+                held_out = f"{predicted:.3f}" if isfinite(predicted) else ""
+                table.add_row(row.way, f"{row.rms_px:.3f}", held_out, f"{row.seconds:.2f}")
+        Console().print(table)
+    print("RMS: 2-D, per point, each view with the pose that suits the way's camera best")
 
 
 def _latency(args: argparse.Namespace) -> int:

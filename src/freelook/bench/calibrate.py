@@ -1,0 +1,193 @@
+"""Calibrations side by side: ours, OpenCV's and mrcal's, on real and on simulated corners.
+
+All get the same corners and are judged in the same way, whatever they print themselves: every
+view gets the pose that suits the way's camera best (least squares over the points that are judged,
+at any angle from the axis), and the distances are taken from there. RMS is that of 2-D distances
+per point. Of simulated views only the points that are where they belong are judged; of real ones
+all. Cross-validated: the same five folds for everybody.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..calibration.bundle import resect_all, rms
+from ..calibration.calibrate import calibrate
+from ..calibration.candidates import FOLDS
+from ..calibration.initial import pose_of
+from ..calibration.views import Pose, View
+from ..camera import Camera, make_camera
+from ..errors import FreelookError
+from ..lens import Equidistant, Equisolid, KannalaBrandt, Lens, Stereographic
+from .boards import Simulated, board, simulate
+from .calibration_peers import PEERS, Peer, PeerFailed
+
+SUCCESS = 0.005  # of the picture's longer side: worse is no calibration
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Set:
+    """Views to calibrate from, and which points (n,) of each are judged."""
+
+    name: str
+    views: tuple[View, ...]
+    size: tuple[int, int]
+    judged: tuple[Bools, ...]
+
+
+@dataclass(frozen=True)
+class Row:
+    """What a way made of a set. `skipped` or `failed` say why there are no figures."""
+
+    set: str
+    way: str
+    rms_px: float = float("nan")
+    cross_validated_px: float = float("nan")
+    seconds: float = float("nan")
+    failed: str = ""
+    skipped: str = ""
+
+
+@dataclass(frozen=True)
+class Ours:
+    """`freelook.calibration.calibrate` with a model, or choosing one."""
+
+    model: str
+
+    @property
+    def name(self) -> str:
+        return f"freelook, {self.model}"
+
+    def missing(self) -> str:
+        return ""
+
+    def calibrate(self, views: Sequence[View], size: tuple[int, int]) -> Camera:
+        try:
+            return calibrate(views, size, self.model).camera
+        except FreelookError as error:
+            raise PeerFailed(str(error)) from None
+
+
+OURS: tuple[Peer, ...] = (Ours("auto"), Ours("kannala_brandt"))
+
+
+def run(
+    sets: Sequence[Set],
+    ways: Sequence[Peer] = (*OURS, *PEERS),
+    *,
+    cross_validate: bool = True,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Iterator[Row]:
+    """A row for each set and way, as soon as it is there."""
+    for each in sets:
+        for way in ways:
+            progress(f"{each.name}: {way.name}")
+            yield _row(each, way, cross_validate)
+
+
+def _row(each: Set, way: Peer, cross_validate: bool) -> Row:
+    if why := way.missing():
+        return Row(each.name, way.name, skipped=why)
+    start = time.perf_counter()
+    try:
+        camera = way.calibrate(each.views, each.size)
+        seconds = time.perf_counter() - start
+        fitted = rms(_distances(camera, each.views, each.judged))
+        if not fitted < SUCCESS * max(each.size):
+            return Row(each.name, way.name, seconds=seconds, failed=f"ends at {fitted:.0f} px RMS")
+        predicted = _cross_validated(each, way) if cross_validate else float("nan")
+    except PeerFailed as error:
+        return Row(each.name, way.name, seconds=time.perf_counter() - start, failed=str(error))
+    return Row(each.name, way.name, fitted, predicted, seconds)
+
+
+def _cross_validated(each: Set, way: Peer) -> float:
+    """NaN where the way fails without some of the views, or cannot see those left out."""
+    off = []
+    for fold in range(FOLDS):
+        kept = [v for i, v in enumerate(each.views) if i % FOLDS != fold]
+        held = range(fold, len(each.views), FOLDS)
+        views, judged = [each.views[i] for i in held], [each.judged[i] for i in held]
+        try:
+            off.append(_distances(way.calibrate(kept, each.size), views, judged))
+        except PeerFailed:
+            return float("nan")
+    return rms(np.concatenate(off))
+
+
+def _distances(
+    camera: Camera, views: Sequence[View], judged: Sequence[Bools]
+) -> NDArray[np.float64]:
+    """(n, 2) seen minus projected of the judged points, each view with the pose that suits it."""
+    poses: list[Pose] = []
+    for view, good in zip(views, judged, strict=True):
+        pose = pose_of(camera, view.only(good))
+        if pose is None:
+            raise PeerFailed(f"{view.name}: its camera sees none of the points")
+        poses.append(pose)
+    near, _ = resect_all(camera, poses, views, robust=True)
+    _, residuals = resect_all(camera, near, views, judged)
+    return np.concatenate([r[good] for r, good in zip(residuals, judged, strict=True)])
+
+
+def simulated_sets() -> list[Set]:
+    """Four lenses of which everything is known; 20 views of 50 corners, 0.2 px of noise."""
+    off_center = (690.0, 505.0)
+    bent = KannalaBrandt(300.0, 0.0035, 0.0007, -0.0021, 0.0002)
+    lenses: tuple[tuple[str, Lens, float, float], ...] = (
+        ("simulated: 120 degrees", Stereographic(415.0), 120, 0.0),
+        ("simulated: 188 degrees", bent, 188, 0.0),
+        ("simulated: 200 degrees, off centre", Equisolid(310.0), 200, 0.0),
+        ("simulated: 160 degrees, 20 % outliers", Equidistant(340.0), 160, 0.2),
+    )
+    sets = []
+    for seed, (name, lens, field, outliers) in enumerate(lenses):
+        center = off_center if "off" in name else None
+        camera = make_camera((1280, 960), lens, center=center, field_deg=field)
+        rng = np.random.default_rng(seed)
+        made = simulate(camera, board(10, 5), 20, rng, noise_px=0.2, outliers=outliers, fewest=40)
+        sets.append(_of(name, made))
+    return sets
+
+
+def _of(name: str, made: Simulated) -> Set:
+    return Set(name, made.views, made.camera.size, made.good)
+
+
+def real_sets(folder: Path) -> list[Set]:
+    """`fish_1` (pictures, corners found by us) and `ov_plane` (given corners), where they are."""
+    sets = []
+    if (pictures := sorted((folder / "fish_1").glob("*.jpg"))) != []:
+        sets.append(_from_pictures("fish_1", pictures))
+    if (corners := sorted((folder / "ov_plane" / "train").glob("*.orpc"))) != []:
+        from ..calibration.corner_files import read_corner_files
+
+        views, size = read_corner_files([str(path) for path in corners])
+        sets.append(Set("ov_plane", tuple(views), size, _all(views)))
+    return sets
+
+
+def _from_pictures(name: str, pictures: Sequence[Path]) -> Set:
+    import cv2
+
+    from ..calibration.targets import Chessboard
+
+    target, views, size = Chessboard(0.0325, (6, 8)), [], (0, 0)
+    for path in pictures:
+        gray = np.asarray(cv2.imread(str(path), cv2.IMREAD_GRAYSCALE), np.uint8)
+        size = (gray.shape[1], gray.shape[0])
+        view = target.find(gray, path.name)
+        if view is not None:
+            views.append(view)
+    return Set(name, tuple(views), size, _all(views))
+
+
+def _all(views: Sequence[View]) -> tuple[Bools, ...]:
+    return tuple(np.ones(len(view.pixels), bool) for view in views)
