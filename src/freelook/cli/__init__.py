@@ -17,7 +17,7 @@ from ..errors import FreelookError, MissingExtra
 
 COMMANDS = (
     *("demo", "fly", "render", "simulate", "lens"),
-    *("calibrate", "calibrate lines", "calibrate mount", "calibrate stereo"),
+    *("calibrate", "calibrate board", "calibrate lines", "calibrate mount", "calibrate stereo"),
     *("track", "track send"),
     *("paper", "bench", "doctor"),
 )
@@ -35,6 +35,7 @@ EXTRA_OF = {
     "matplotlib": "plot",
     "numba": "render",
     "playwright": "bench",
+    "reportlab": "print",
     "rich": "cli",
     "serial": "serial",
 }

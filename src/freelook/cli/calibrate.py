@@ -1,7 +1,8 @@
-"""Calibrate a camera from pictures of a chessboard, beyond 90 degrees too.
+"""Calibrate a camera from pictures of a target, beyond 90 degrees too.
 
-  freelook calibrate shots/*.jpg -o lens.json                               size found by itself
+  freelook calibrate shots/*.jpg -o lens.json                  a chessboard, size found by itself
   freelook calibrate shots/*.jpg --board 6x8 --square 0.0325 -o lens.json --report report.html
+  freelook calibrate shots/*.jpg --target charuco:10x7:0.024:0.018 -o lens.json
   freelook calibrate board.mp4 --model auto -o lens.json                    from a video
   freelook calibrate corners/*.orpc --json                                  from known corners
   freelook calibrate --live /dev/video0 -o lens.json                        with a page that guides
@@ -22,9 +23,9 @@ import numpy as np
 
 from ..errors import CalibrationError, FreelookError
 from ..lens import MODELS
-from ._arguments import size
 from ._calibrate_live import add_live_arguments, run_live
 from ._profile_text import profile_text
+from ._targets import add_target_arguments, chosen_target
 
 if TYPE_CHECKING:
     from ..calibration.calibrate import Calibration
@@ -34,12 +35,6 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("inputs", nargs="*", metavar="INPUT", help="pictures, videos, corner files")
-    parser.add_argument(
-        "--board", type=size, metavar="CxR", help="inner corners across x down (default: found)"
-    )
-    parser.add_argument(
-        "--square", type=float, default=1.0, metavar="M", help="side of a square, metres"
-    )
     parser.add_argument(
         "--model",
         default="auto",
@@ -57,16 +52,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--report", metavar="HTML", help="write a page with pictures of it all")
     parser.add_argument("--json", action="store_true", help="print all figures as JSON")
     parser.add_argument("--overwrite", action="store_true", help="replace files that exist")
+    add_target_arguments(parser)
     add_live_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
-    from ..calibration.targets import Chessboard
-
     for path in (args.output, args.report):
         if path and Path(path).exists() and not args.overwrite:
             raise FreelookError(f"{path} exists; --overwrite replaces it")
-    target = Chessboard(args.square, args.board)
+    target = chosen_target(args)
     return run_live(args, target) if args.live else _run(args, target)
 
 

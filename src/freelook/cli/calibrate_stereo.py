@@ -5,7 +5,9 @@ together have the same name, or the same last number in it (left_07.png, right_0
 videos the same number. The target may be missing in either picture of a pair.
 
   freelook calibrate stereo shots/left shots/right --board 8x6 --square 0.03 -o rig
-  freelook calibrate stereo left.mp4 right.mp4 --square 0.03 --json
+  freelook calibrate stereo left.mp4 right.mp4 --target charuco:10x7:0.024:0.018 -o rig
+
+Of a target with numbered markers (charuco, aprilgrid) the cameras may see different parts.
 
 The folder given with -o gets left.json and right.json, lens profiles mounted so that both look the
 same way, and rig.json: rotation, baseline and how well they are known.
@@ -24,7 +26,7 @@ import numpy as np
 
 from ..errors import FreelookError
 from ..lens import MODELS
-from ._arguments import size
+from ._targets import add_target_arguments, chosen_target, grid_without_names, measured
 
 if TYPE_CHECKING:
     from ..calibration.stereo import Moment, StereoCalibration
@@ -43,12 +45,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("left", metavar="LEFT", help="folder of pictures, or a video")
     parser.add_argument("right", metavar="RIGHT", help="the same of the other camera")
     parser.add_argument(
-        "--board", type=size, metavar="CxR", help="inner corners across x down (default: found)"
-    )
-    parser.add_argument(
-        "--square", type=float, default=1.0, metavar="M", help="side of a square, metres"
-    )
-    parser.add_argument(
         "--model",
         default="auto",
         choices=("auto", *MODELS),
@@ -60,15 +56,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--name", default="", help="for people: which rig it is")
     parser.add_argument("--json", action="store_true", help="print all figures as JSON")
     parser.add_argument("--overwrite", action="store_true", help="replace files that exist")
+    add_target_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     from ..calibration.parameters import Freedom
     from ..calibration.stereo import calibrate_stereo
-    from ..calibration.targets import Chessboard
 
     _check_output(args)
-    target = Chessboard(args.square, args.board)
+    target = chosen_target(args)
+    ambiguous, board = grid_without_names(target)
     moments, sizes = _moments(args, target)
 
     def say(what: str) -> None:
@@ -80,13 +77,14 @@ def run(args: argparse.Namespace) -> int:
         sizes,
         args.model,
         Freedom(aspect=not args.square_pixels),
-        board=args.board,
+        ambiguous=ambiguous,
+        board=board,
         progress=say,
     )
     if args.json:
         print(json.dumps(figures(stereo), indent=2))
     else:
-        for line in sentences(stereo, measured=args.square != 1.0):
+        for line in sentences(stereo, measured=measured(target)):
             print(line)
     if args.output:
         _write(args, stereo)
