@@ -1,0 +1,50 @@
+"""Sensible fields of view for a camera: not so narrow that there is nothing left to see, not so
+wide that the lens has nothing more to show.
+
+At the middle of a view of `width` pixels there are (width / 2) / tan(hfov / 2) pi / 180 view pixels
+to a degree; the camera has its own (`freelook.resolution`). A view may enlarge the camera's pixels
+`MOST_ENLARGED` times; narrower fields would show the same blur, larger.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..camera import Camera
+from ..resolution import resolution_at
+from ..viewport import NARROWEST_DEG, WIDEST_DEG
+
+MOST_ENLARGED = 6.0
+FULL_SPEED_DEG = 90.0
+
+
+@dataclass(frozen=True)
+class ZoomLimits:
+    """Degrees across the view."""
+
+    narrowest_deg: float
+    widest_deg: float
+
+    def clamp(self, field_deg: float) -> float:
+        return min(self.widest_deg, max(self.narrowest_deg, field_deg))
+
+
+def zoom_limits(camera: Camera, width_px: float) -> ZoomLimits:
+    """For views `width_px` across, by what the camera resolves on its axis.
+
+    Always within 10 and 150 degrees, and never narrower than wide.
+    """
+    per_degree = float(resolution_at(camera, np.array([0.0, 0.0, 1.0])).mean)
+    focal_px = MOST_ENLARGED * per_degree * math.degrees(1.0)
+    narrowest = max(NARROWEST_DEG, math.degrees(2 * math.atan(width_px / 2 / focal_px)))
+    widest = max(NARROWEST_DEG, min(WIDEST_DEG, 2 * math.degrees(camera.theta_max)))
+    return ZoomLimits(min(narrowest, widest), widest)
+
+
+def sensitivity(field_deg: float) -> float:
+    """By how much turning by hand is slowed down in a narrow view: what is seen then moves across
+    the screen as fast as in a view of 90 degrees; never sped up."""
+    return min(1.0, math.tan(math.radians(field_deg) / 2) / math.tan(math.radians(45.0)))
