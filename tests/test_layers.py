@@ -14,10 +14,11 @@ PACKAGE = Path(freelook.__file__).parent
 LAYERS: list[set[str]] = [
     {"types", "errors", "clock"},
     {"lens", "camera", "viewport", "rotations", "mailbox", "axes", "pose_script", "attitude"}
+    | {"attitude_track", "rate_integration"}
     | {"color", "datagrams", "latency", "plugins"},
-    {"renderers", "gimbal", "simulation", "media", "fitting", "plots", "calibration"}
-    | {"resolution", "view_cost", "comparison"},
-    {"sources", "trackers", "sinks", "formats"},
+    {"renderers", "gimbal", "prediction", "simulation", "media", "fitting", "plots", "calibration"}
+    | {"resolution", "view_cost", "comparison", "duel"},
+    {"sources", "trackers", "attitudes", "sinks", "formats"},
     {"ingest", "head", "session", "offline"},
     {"cli", "web", "bench", "paper", "report", "doctor", "egl"},
 ]

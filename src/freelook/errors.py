@@ -6,6 +6,7 @@
     ├── CalibrationError  views of a target that no camera can be calibrated from
     ├── SourceError       video that cannot be opened or read
     ├── TrackerError      a head tracker that cannot be opened
+    ├── AttitudeError     a vehicle's attitude that cannot be read, or not be matched to its video
     ├── RenderError       a picture or a view that cannot be rendered
     ├── SinkError         an output that cannot be written
     └── MissingExtra      an optional library is not installed; names the extra
@@ -45,6 +46,10 @@ class SourceError(FreelookError):
 
 class TrackerError(FreelookError):
     """A head tracker that cannot be opened or understood."""
+
+
+class AttitudeError(FreelookError):
+    """A vehicle's attitude that cannot be read, or not be matched to the video."""
 
 
 class RenderError(FreelookError):
