@@ -19,7 +19,7 @@ COMMANDS = (
     *("demo", "fly", "render", "simulate", "lens"),
     *("calibrate", "calibrate board", "calibrate lines", "calibrate mount", "calibrate stereo"),
     *("track", "track send"),
-    *("paper", "bench", "doctor"),
+    *("duel", "paper", "bench", "doctor"),
 )
 
 EXTRA_OF = {

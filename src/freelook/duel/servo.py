@@ -1,0 +1,76 @@
+"""A motor that follows commands: as fast and as quickly speeding up as it can, no more.
+
+The model is a servo at its best: it knows how far it has still to go and brakes in time, it
+never overshoots a command that stands still, has no load, no friction and no play. What is left
+are the limits that its data sheet states.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import copysign, inf, isinf, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..clock import NS_PER_MS, NS_PER_S
+from .stages import newest
+
+Floats = NDArray[np.float64]
+Times = NDArray[np.int64]
+STEP_NS = NS_PER_MS
+THERE_DEG, AT_REST_DEG_S = 1e-9, 1e-6  # rounding, not motion
+
+
+@dataclass(frozen=True)
+class Motor:
+    """What one axis can do. `slew_deg_s` and `accel_deg_s2` may be infinite.
+
+    `dead_band_deg`: at rest it does not answer a command nearer than this.
+    """
+
+    slew_deg_s: float = inf
+    accel_deg_s2: float = inf
+    dead_band_deg: float = 0.0
+
+
+def drive(motor: Motor, command_ns: Times, command_deg: Floats, end_ns: int) -> Floats:
+    """The angle at every millisecond from 0 to `end_ns`, in degrees.
+
+    It begins at rest at the first command. A command counts from its time on.
+    """
+    steps = np.arange(end_ns // STEP_NS, dtype=np.int64) * STEP_NS
+    targets = command_deg[newest(command_ns, steps)]
+    return np.array(_follow(motor, float(command_deg[0]), targets.tolist()))
+
+
+def _follow(motor: Motor, position: float, targets: list[float]) -> list[float]:
+    """One position more than there are steps: the first is where it begins."""
+    dt = STEP_NS / NS_PER_S
+    slew, accel, dead_band = motor.slew_deg_s, motor.accel_deg_s2, motor.dead_band_deg
+    gain = accel * dt  # by how much the speed can change in a step
+    unlimited = isinf(accel)
+    speed, moving = 0.0, False
+    positions = [position]
+    for target in targets:
+        error = target - position
+        moving = moving or abs(error) > dead_band
+        if moving:
+            distance = abs(error)
+            wanted = min(slew, distance / dt)
+            if not unlimited:
+                # the fastest from which it can still stop there, in whole steps of dt:
+                # distance = gain dt n (n + 1) / 2, n steps from the end
+                wanted = min(wanted, gain * (sqrt(0.25 + 2 * distance / (gain * dt)) - 0.5))
+            change = copysign(wanted, error) - speed
+            speed += change if unlimited else min(max(change, -gain), gain)
+            position += speed * dt
+            moving = abs(speed) > AT_REST_DEG_S or abs(target - position) > THERE_DEG
+            speed = speed if moving else 0.0
+        positions.append(position)
+    return positions
+
+
+def angle_at(positions_deg: Floats, t_ns: Times) -> Floats:
+    """The angle between the milliseconds of `drive`, in degrees; the last after the end."""
+    return np.interp(t_ns / STEP_NS, np.arange(len(positions_deg)), positions_deg)
