@@ -1,27 +1,28 @@
-"""Pictures of flat targets through known cameras: every pixel is the mean over its area."""
+"""Pictures of printed targets through known cameras: every pixel is the mean over its area."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from freelook.calibration.drawing import Drawing
 from freelook.calibration.views import Pose
 from freelook.camera import Camera, make_camera
 from freelook.lens import Equidistant, Floats
 
 Gray = NDArray[np.uint8]
-Shade = Callable[[Floats, Floats], Floats]  # reflectance 0 to 1 at points (x, y) of the target
+Pictures = NDArray[np.float32]
 
-FISHEYE = make_camera((960, 720), Equidistant(260.0), center=(487.3, 352.8), field_deg=200)
-# Places in a pixel that are looked at: a Fibonacci lattice, shifted at random in every pixel, so
-# that what is left of stairs along edges is noise and moves no corner.
-STEPS = np.arange(34)
-SAMPLES = (np.stack([STEPS, STEPS * 21 % 34], axis=-1) + 0.5) / 34
+BEHIND = 0.35  # reflectance of what is behind a target
+# Places in a pixel that are looked at: a Fibonacci lattice, in which no two lie in one row or
+# column, so that an edge moves in steps of 1/21 pixel.
+STEPS = np.arange(21)
+SAMPLES = (np.stack([STEPS, STEPS * 13 % 21], axis=-1) + 0.5) / 21
 
 
 @dataclass(frozen=True)
@@ -31,106 +32,186 @@ class Light:
     black: float = 30.0
     white: float = 220.0
     blur_px: float = 0.6
-    noise: float = 0.0
+    noise: float = 1.5
     fall_off: float = 0.0  # towards the right edge: share of the light that is lost there
 
 
-def chessboard(inner: tuple[int, int], square: float, margin: float = 1.0) -> Shade:
-    """Inner corners at (0, 0) ... ((c - 1), (r - 1)) squares, dark beyond a light margin."""
+@dataclass(frozen=True)
+class Print:
+    """A target on paper: reflectance by texel, texels per unit.
 
-    def shade(x: Floats, y: Floats) -> Floats:
-        i, j = np.floor(x / square), np.floor(y / square)
-        inside = (i >= -1) & (i < inner[0]) & (j >= -1) & (j < inner[1])
-        light = ((i + j) % 2 == 1) | ~inside
-        paper = (
-            (x > -(1 + margin) * square)
-            & (x < (inner[0] + margin) * square)
-            & (y > -(1 + margin) * square)
-            & (y < (inner[1] + margin) * square)
-        )
-        return np.where(paper, np.where(light, 1.0, 0.0), 0.35)
+    The print's top left corner is the target point `corner`, and its y runs down along the
+    target's y, or against it if `up`.
+    """
 
-    return shade
+    texture: Pictures
+    per_unit: float
+    corner: tuple[float, float] = (0.0, 0.0)
+    up: bool = False
+
+    @property
+    def size(self) -> tuple[float, float]:
+        rows, columns = self.texture.shape
+        return columns / self.per_unit, rows / self.per_unit
+
+    @property
+    def middle(self) -> tuple[float, float]:
+        """In the target's coordinates."""
+        width, height = self.size
+        return self.corner[0] + width / 2, self.corner[1] + height / (-2 if self.up else 2)
+
+    def texels(self, points: Floats) -> Floats:
+        """(..., 2) texel coordinates of target points (..., 2)."""
+        offset = (points - self.corner) * (1.0, -1.0 if self.up else 1.0)
+        return np.asarray(offset * self.per_unit - 0.5)
+
+    def hidden(self, left: float, top: float, right: float, bottom: float) -> Print:
+        """Something dark lies on this part, in shares of width and height."""
+        rows, columns = self.texture.shape
+        texture = self.texture.copy()
+        texture[
+            int(top * rows) : int(bottom * rows), int(left * columns) : int(right * columns)
+        ] = 0
+        return Print(texture, self.per_unit, self.corner, self.up)
 
 
-def picture(texture: Gray, per_unit: float, origin: tuple[float, float] = (0.0, 0.0)) -> Shade:
-    """A printed picture: target point (x, y) is its pixel ((x, y) - origin) * per_unit."""
+def printed(
+    drawing: Drawing,
+    corner: tuple[float, float] = (0.0, 0.0),
+    *,
+    up: bool = False,
+    across: int = 900,
+) -> Print:
+    """A drawing in `across` texels along its longer side; each is the mean over its area."""
+    per_unit = across / max(drawing.size)
+    columns, rows = (round(length * per_unit) for length in drawing.size)
+    dark = np.zeros((rows, columns))
+    for x, y, width, height in drawing.rectangles * per_unit:
+        wide, wide_at = _covered(x, width, columns)
+        high, high_at = _covered(y, height, rows)
+        dark[high_at, wide_at] += np.outer(high, wide)
+    y, x = np.mgrid[:rows, :columns] + 0.5
+    for middle_x, middle_y, radius in drawing.circles * per_unit:
+        box = np.s_[
+            max(0, int(middle_y - radius - 2)) : int(middle_y + radius + 2),
+            max(0, int(middle_x - radius - 2)) : int(middle_x + radius + 2),
+        ]
+        inside = 0.5 + radius - np.hypot(x[box] - middle_x, y[box] - middle_y)
+        dark[box] = np.maximum(dark[box], np.clip(inside, 0, 1))
+    texture = (1 - np.clip(dark, 0, 1)).astype(np.float32)
+    return Print(texture, per_unit, corner, up)
 
-    def shade(x: Floats, y: Floats) -> Floats:
-        rows, columns = texture.shape
-        u = np.floor((x - origin[0]) * per_unit).astype(int)
-        v = np.floor((y - origin[1]) * per_unit).astype(int)
-        there = (u >= 0) & (u < columns) & (v >= 0) & (v < rows)
-        value = texture[np.clip(v, 0, rows - 1), np.clip(u, 0, columns - 1)] / 255.0
-        return np.where(there, value, 0.35)
 
-    return shade
+def _covered(start: float, length: float, count: int) -> tuple[Floats, slice]:
+    """How much of each texel, along one axis, lies between start and start + length."""
+    first, last = max(0, int(start)), min(count, int(np.ceil(start + length)))
+    edges = np.clip(np.arange(first, last + 1), start, start + length)
+    return np.diff(edges), slice(first, last)
 
 
-def facing(
+def held(
+    paper: Print,
     toward_deg: tuple[float, float],
     distance: float,
-    middle: tuple[float, float],
     tilt_deg: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> Pose:
-    """A pose: the target's `middle` lies `distance` along the ray (right, down) degrees away.
+    """A pose: the print's middle lies `distance` along the ray (right, down) degrees away.
 
-    Untilted, the target faces the camera; `tilt_deg` turns it about its own x, y and z.
+    Untilted, the print faces the camera; `tilt_deg` turns it about its own x, y and z.
     """
     right, down = toward_deg
     look = Rotation.from_euler("YX", [right, -down], degrees=True)
     turn = look * Rotation.from_euler("xyz", tilt_deg, degrees=True)
+    if paper.up:
+        turn = turn * Rotation.from_euler("x", 180, degrees=True)
     place = look.apply([0.0, 0.0, distance])
-    return Pose(turn, place - turn.apply([middle[0], middle[1], 0.0]))
+    return Pose(turn, place - turn.apply([*paper.middle, 0.0]))
 
 
-def seen(camera: Camera, pose: Pose, points: Floats) -> Floats:
-    """Pixels (n, 2) of target points (n, 2 or 3)."""
-    flat = points if points.shape[1] == 3 else np.column_stack([points, np.zeros(len(points))])
-    return camera.project(pose.apply(flat))
+@dataclass(frozen=True)
+class Studio:
+    """A camera that photographs targets, and knows exactly where it saw their points."""
+
+    camera: Camera
+
+    def seen(self, pose: Pose, points: Floats) -> Floats:
+        """Pixels (n, 2) of target points (n, 3), wherever they are; NaN beyond the field."""
+        return self.camera.project(pose.apply(points))
+
+    def inside(self, pixels: Floats, margin: float = 0.0) -> NDArray[np.bool_]:
+        """Which pixels (n, 2) are in the picture, that far from its edge."""
+        within = np.isfinite(pixels).all(axis=1)
+        pixels = np.where(within[:, None], pixels, -1.0)
+        last = np.array(self.camera.size) - 1
+        return np.asarray(((pixels >= margin) & (pixels <= last - margin)).all(axis=1))
+
+    def photograph(
+        self,
+        pose: Pose,
+        paper: Print,
+        light: Light | None = None,
+        rng: np.random.Generator | None = None,
+    ) -> Gray:
+        """What is seen of the target, with mid grey around it and black outside the field."""
+        light, rng = light or Light(), rng or np.random.default_rng(0)
+        width, height = self.camera.size
+        value = np.full((height, width), BEHIND, np.float32)
+        texels, there = _texels(self._rays, pose, paper)
+        if there.any():
+            rows, columns = (np.flatnonzero(there.any(axis=axis)) for axis in (1, 0))
+            box = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+            corners = np.s_[rows[0] : rows[-1] + 2, columns[0] : columns[-1] + 2]
+            value[box] = np.where(there[box], _mean(paper.texture, texels[corners]), BEHIND)
+        value = light.black + (light.white - light.black) * value
+        value *= 1 - light.fall_off * np.arange(width, dtype=np.float32) / width
+        value = np.where(self._lit, value, 8.0)
+        if light.blur_px:
+            value = cv2.GaussianBlur(value, (0, 0), light.blur_px)
+        value = value + light.noise * rng.standard_normal(value.shape, np.float32)
+        return np.asarray(np.clip(np.round(value), 0, 255), dtype=np.uint8)
+
+    @cached_property
+    def _rays(self) -> Floats:
+        """(rows + 1, columns + 1, 3) through the corners of pixels."""
+        width, height = self.camera.size
+        x, y = np.meshgrid(np.arange(width + 1) - 0.5, np.arange(height + 1) - 0.5)
+        return self.camera.ray(np.stack([x, y], axis=-1))
+
+    @cached_property
+    def _lit(self) -> NDArray[np.bool_]:
+        return _whole(np.isfinite(self._rays[..., 2]))
 
 
-def photograph(
-    camera: Camera,
-    pose: Pose,
-    shade: Shade,
-    light: Light | None = None,
-    rng: np.random.Generator | None = None,
-) -> Gray:
-    """What the camera sees of the target, with mid grey around it and black outside the field."""
-    light = light or Light()
-    width, height = camera.size
-    # target coordinates at the corners of pixels; between them they are linear to 1e-3 px
-    x, y = np.meshgrid(np.arange(width + 1) - 0.5, np.arange(height + 1) - 0.5)
-    rays = camera.ray(np.stack([x, y], axis=-1))
-    lit = np.isfinite(rays[..., 2])
-    rays = np.where(lit[..., None], rays, [0.0, 0.0, 1.0])
+def _whole(corners: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Pixels all of whose corners are so."""
+    return corners[:-1, :-1] & corners[:-1, 1:] & corners[1:, :-1] & corners[1:, 1:]
+
+
+FISHEYE = Studio(make_camera((960, 720), Equidistant(260.0), center=(487.3, 352.8), field_deg=200))
+
+
+def _texels(rays: Floats, pose: Pose, paper: Print) -> tuple[Floats, NDArray[np.bool_]]:
+    """Texels at the corners of pixels (linear between them to 1e-3 px), and which pixels they
+    cover."""
+    rays = np.where(np.isfinite(rays[..., 2:]), rays, [0.0, 0.0, 0.0])
     turn = pose.camera_from_target.as_matrix()
     direction, origin = rays @ turn, -pose.translation @ turn
-    depth = np.divide(
-        -origin[2],
-        direction[..., 2],
-        out=np.full(lit.shape, -1.0),
-        where=np.abs(direction[..., 2]) > 0.02,
-    )
-    at = origin[:2] + depth[..., None] * direction[..., :2]
-    ahead = depth > 0
-    total = np.zeros((height, width))
-    shift_u, shift_v = np.random.default_rng(34).random((2, height, width, 1))
-    for start_u, start_v in SAMPLES:
-        u, v = (start_u + shift_u) % 1, (start_v + shift_v) % 1
-        top = at[:-1, :-1] * (1 - u) + at[:-1, 1:] * u
-        low = at[1:, :-1] * (1 - u) + at[1:, 1:] * u
-        here = top * (1 - v) + low * v
-        total += shade(here[..., 0], here[..., 1])
-    whole = ahead[:-1, :-1] & ahead[:-1, 1:] & ahead[1:, :-1] & ahead[1:, 1:]
-    value = np.where(whole, total / len(SAMPLES), 0.35)
-    value = light.black + (light.white - light.black) * value
-    value *= 1 - light.fall_off * np.arange(width) / width
-    value = np.where(lit[:-1, :-1], value, 8.0)
-    if light.blur_px:
-        value = cv2.GaussianBlur(value, (0, 0), light.blur_px)
-    if light.noise:
-        assert rng is not None
-        value = value + rng.normal(0, light.noise, value.shape)
-    return np.asarray(np.clip(np.round(value), 0, 255), dtype=np.uint8)
+    steep = np.abs(direction[..., 2]) > 0.02
+    depth = np.full(steep.shape, -1.0)
+    np.divide(-origin[2], direction[..., 2], out=depth, where=steep)
+    texels = paper.texels(origin[:2] + depth[..., None] * direction[..., :2])
+    rows, columns = paper.texture.shape
+    on_it = (depth > 0) & ((texels >= -0.5) & (texels <= (columns - 0.5, rows - 0.5))).all(axis=-1)
+    return texels, _whole(on_it)
+
+
+def _mean(texture: Pictures, corners: Floats) -> Pictures:
+    """Mean of a texture over pixels whose corners are at these texels."""
+    corners = np.clip(corners, -1e4, 1e4).astype(np.float32)
+    quarters = corners[:-1, :-1], corners[:-1, 1:], corners[1:, :-1], corners[1:, 1:]
+    total = np.zeros(quarters[0].shape[:2], np.float32)
+    for u, v in SAMPLES:
+        shares = (1 - u) * (1 - v), u * (1 - v), (1 - u) * v, u * v
+        at = sum(np.float32(share) * part for share, part in zip(shares, quarters, strict=True))
+        total += cv2.remap(texture, at, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return total / len(SAMPLES)

@@ -13,16 +13,18 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from ..errors import CalibrationError
 from ..lens import Floats
-from ._lattice import Bools, LocalMaps, in_squares, maps_at
+from ._lattice import SAME_PX, Bools, LocalMaps, in_squares, maps_at
 from ._saddles import Gray, Slopes, Window, likeness, placed
 
 STRAY = 0.5  # of a square: how far a marker may be from where the others expect it
 ENOUGH = 0.6  # of the markers: the corners between them are found without the others
 DOUBLED = 2_000_000  # pixels: pictures up to that are looked at enlarged too, others made small
 LIKE = 0.65  # correlation with the ideal corner; which corner it is, markers say
+REACHES = 0.5, 1.1  # pitches from what is known, that corners are looked for at
 RINGS_REACH = 0.34  # of what `likeness` looks at
 DICTIONARIES = {
     name.removeprefix("DICT_").lower(): getattr(cv2.aruco, name)
@@ -107,21 +109,47 @@ def find_corners(
     markers, seen = plan.markers[numbers[known]], seen[known]
     good = _without_strays(markers.mean(axis=1), seen.mean(axis=1))
     points, pixels = markers[good].reshape(-1, 2), seen[good].reshape(-1, 2)
-    slopes = Slopes.of(gray)
-    at = np.full((len(plan.corners), 2), np.nan)
-    missing = np.arange(len(at))
-    while len(points) and len(missing):
-        maps = maps_at(plan.corners[missing], points, pixels)
-        places = _placed(slopes, plan, missing[maps.known], maps.part(maps.known))
-        found = np.isfinite(places[:, 0])
-        new = missing[maps.known][found]
-        at[new] = places[found]
-        if not len(new):
-            break
-        points = np.concatenate([points, plan.corners[new]])
-        pixels = np.concatenate([pixels, places[found]])
-        missing = np.setdiff1d(missing, new)
-    return _once_more(slopes, plan, at)
+    search = _Search(Slopes.of(gray), plan)
+    while search.round(points, pixels):
+        found = np.flatnonzero(np.isfinite(search.at[:, 0]))
+        points = np.concatenate([markers[good].reshape(-1, 2), plan.corners[found]])
+        pixels = np.concatenate([seen[good].reshape(-1, 2), search.at[found]])
+    return _once_more(search.slopes, plan, _each_once(search.at))
+
+
+class _Search:
+    """Looks for a plan's corners round by round: `at` (n, 2), NaN until they are found."""
+
+    def __init__(self, slopes: Slopes, plan: Plan) -> None:
+        self.slopes, self.plan = slopes, plan
+        self.at = np.full((len(plan.corners), 2), np.nan)
+        self._tried = np.full_like(self.at, np.inf)
+
+    def round(self, points: Floats, pixels: Floats) -> bool:
+        """Look beside what is known, the nearest first; whether anything was found."""
+        missing = np.flatnonzero(np.isnan(self.at[:, 0]))
+        if not len(points) or not len(missing):
+            return False
+        distance, _ = cKDTree(points).query(self.plan.corners[missing])
+        return any(self._look(missing[distance < reach], points, pixels) for reach in REACHES)
+
+    def _look(self, which: NDArray[np.int64], points: Floats, pixels: Floats) -> bool:
+        maps = maps_at(self.plan.corners[which], points, pixels)
+        moved = np.abs(maps.place - self._tried[which]).max(axis=1, initial=0.0) > SAME_PX
+        worth = maps.known & moved
+        which, maps = which[worth], maps.part(worth)
+        self._tried[which] = maps.place
+        self.at[which] = _placed(self.slopes, self.plan, which, maps)
+        return bool(np.isfinite(self.at[which]).any())
+
+
+def _each_once(at: Floats) -> Floats:
+    """Without those that were found at one place: one of them is not there, and which, is open."""
+    found = np.flatnonzero(np.isfinite(at[:, 0]))
+    pairs = cKDTree(at[found]).query_pairs(1.0, output_type="ndarray") if len(found) else []
+    at = at.copy()
+    at[found[np.unique(pairs).astype(int)]] = np.nan
+    return at
 
 
 def _placed(slopes: Slopes, plan: Plan, which: NDArray[np.int64], maps: LocalMaps) -> Floats:

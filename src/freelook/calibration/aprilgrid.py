@@ -20,6 +20,7 @@ from .views import FEWEST_POINTS, View
 
 FAMILY = "apriltag_36h11"
 SEARCH = 0.65  # of the space between tags; the next corner is of the other kind
+CLEAR = 0.85  # of that space: beyond, blur mixes in what the next corner's edges are like
 BORDERS = (2, 1)  # dark bits around a tag: Kalibr's, and those of other programs
 
 
@@ -95,5 +96,5 @@ class AprilGrid:
         markers = np.stack([bottom[:, 1], bottom[:, 0], top[:, 0], top[:, 1]], axis=1)
         # at the bottom left of a tag it is the squares on the diagonal that are dark
         signs = np.where(np.indices((2 * rows, 2 * columns)).sum(axis=0) % 2 == 0, -1.0, 1.0)
-        search = SEARCH * self.spacing
-        return Plan(markers, self.points[:, :2] / self.tag, signs.ravel(), self.spacing, search)
+        clear, search = CLEAR * self.spacing, SEARCH * self.spacing
+        return Plan(markers, self.points[:, :2] / self.tag, signs.ravel(), clear, search)
