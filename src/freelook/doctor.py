@@ -20,13 +20,14 @@ from typing import Literal
 
 from . import __version__
 from .datagrams import BUFFER_BYTES
-from .egl import renderer_name
+from .egl import best_device
+from .renderers.choice import GlDevice, choose, has_moderngl
 
 State = Literal["ok", "warn", "no"]
 
 # what freelook cannot fly without; the other extras add to it
 ESSENTIAL_EXTRAS = ("render", "video", "web")
-EXTRAS = (*ESSENTIAL_EXTRAS, "rtsp", "cli")
+EXTRAS = (*ESSENTIAL_EXTRAS, "rtsp", "cli", "gl")
 HARDWARE_ENCODERS = ("h264_nvenc", "h264_vaapi", "h264_qsv", "h264_amf", "h264_videotoolbox")
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "firefox", "microsoft-edge")
 PORTS = (
@@ -143,9 +144,16 @@ def _opens(encoder: str) -> bool:
 
 
 def check_graphics() -> Iterator[Check]:
-    name = renderer_name()
-    what = f"OpenGL by {name}" if name else "no OpenGL without a window"
-    yield Check("graphics", "ok", f"{what} (not needed: files are rendered on the CPU)")
+    yield from graphics_lines(best_device(), has_moderngl())
+
+
+def graphics_lines(device: GlDevice | None, library: bool) -> Iterator[Check]:
+    """What OpenGL there is, and which renderer is chosen by itself."""
+    what = f"OpenGL by {device.renderer}" if device else "no OpenGL without a window"
+    yield Check("graphics", "ok", f"{what} (not needed: the CPU renders too)")
+    unused = device is not None and not device.software and not library
+    todo = "to use the GPU: pip install 'freelook[gl]'" if unused else ""
+    yield Check("renderer", "ok", str(choose("auto", device, library)), todo)
 
 
 def check_processor() -> Iterator[Check]:

@@ -1,10 +1,16 @@
-"""What renderers share about pictures: plane scales, black, and whether a picture fits."""
+"""What renderers share: plane scales, black, kinds of sampling, whether a picture fits."""
 
 from __future__ import annotations
+
+from typing import Literal
 
 from ..camera import Camera
 from ..errors import RenderError
 from ..types import Picture
+
+Sampling = Literal["bilinear", "bicubic"]
+SAMPLINGS: tuple[Sampling, ...] = ("bilinear", "bicubic")
+"""Between pixels: bilinear, or Keys' cubic with a = -0.75 (as OpenCV), sharper where enlarged."""
 
 
 def plane_scales(picture: Picture) -> tuple[int, ...]:

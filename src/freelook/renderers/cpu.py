@@ -21,7 +21,7 @@ from ..camera import Camera
 from ..types import Picture, Plane
 from ..viewport import Viewport
 from . import kernels
-from .blank import black_of, check_fits, plane_scales
+from .blank import Sampling, black_of, check_fits, plane_scales
 
 # measured; multiples of the node spacings, so that no node is computed twice
 BAND_ROWS = (128, 144, 112, 96)
@@ -34,13 +34,14 @@ _Constants = tuple[Any, ...]
 
 
 class CpuRenderer:
-    """Renders views on `threads` cores (default: all).
+    """Renders views on `threads` cores (default: all), with one sample for each pixel.
 
     Keeps its buffers, so one renderer serves one caller at a time. The returned planes are the
     caller's to keep.
     """
 
-    def __init__(self, threads: int | None = None) -> None:
+    def __init__(self, threads: int | None = None, *, sampling: Sampling = "bilinear") -> None:
+        self._flags = {"bilinear": cv2.INTER_LINEAR, "bicubic": cv2.INTER_CUBIC}[sampling]
         self._threads = threads or os.cpu_count() or 1
         self._pool = ThreadPoolExecutor(self._threads - 1) if self._threads > 1 else None
         self._scratch = [_Scratch() for _ in range(self._threads)]
@@ -68,7 +69,7 @@ class CpuRenderer:
             for plane, out, scale, black in planes:
                 maps = luma if scale == 1 else chroma
                 band = out[first_row // scale :][: maps.shape[1]]
-                _sample(plane, maps, black, band)
+                _sample(plane, maps, self._flags, black, band)
                 if rim:
                     _feather(band, maps[2], camera.table.t_max, black)
 
@@ -152,12 +153,10 @@ def _bands(height: int, threads: int) -> list[tuple[int, int]]:
     return [(row, min(rows, height - row)) for row in range(0, height, rows)]
 
 
-def _sample(plane: Plane, maps: FloatMap, black: int, out: Plane) -> None:
+def _sample(plane: Plane, maps: FloatMap, flags: int, black: int, out: Plane) -> None:
     value = (black,) * 4
     x, y = maps[0], maps[1]
-    cv2.remap(
-        plane, x, y, cv2.INTER_LINEAR, dst=out, borderMode=cv2.BORDER_CONSTANT, borderValue=value
-    )
+    cv2.remap(plane, x, y, flags, dst=out, borderMode=cv2.BORDER_CONSTANT, borderValue=value)
 
 
 def _feather(view: Plane, t: FloatMap, t_max: float, black: int) -> None:

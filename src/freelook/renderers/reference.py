@@ -12,11 +12,14 @@ from ..camera import Camera
 from ..lens import Floats
 from ..types import Picture, Plane
 from ..viewport import Viewport
-from .blank import black_of, check_fits, plane_scales
+from .blank import Sampling, black_of, check_fits, plane_scales
 
 
 class ReferenceRenderer:
-    """Bilinear sampling at exactly projected pixels; no feather at the rim."""
+    """One sample at each exactly projected pixel; no feather at the rim."""
+
+    def __init__(self, sampling: Sampling = "bilinear") -> None:
+        self._sample = {"bilinear": sample, "bicubic": sample_bicubic}[sampling]
 
     def render(
         self, picture: Picture, camera: Camera, camera_from_view: Rotation, viewport: Viewport
@@ -24,7 +27,7 @@ class ReferenceRenderer:
         check_fits(picture, camera)
         pixels = coordinates(camera, camera_from_view, viewport)
         planes = tuple(
-            sample(plane, _at_scale(pixels, scale), black)
+            self._sample(plane, _at_scale(pixels, scale), black)
             for plane, scale, black in zip(
                 picture.planes, plane_scales(picture), black_of(picture), strict=True
             )
@@ -56,6 +59,36 @@ def sample(plane: Plane, pixels: Floats, black: float) -> Plane:
     top = padded[y0, x0] * (1 - fx) + padded[y0, x0 + 1] * fx
     bottom = padded[y0 + 1, x0] * (1 - fx) + padded[y0 + 1, x0 + 1] * fx
     return np.rint(top * (1 - fy) + bottom * fy).astype(np.uint8)
+
+
+def sample_bicubic(plane: Plane, pixels: Floats, black: float) -> Plane:
+    """As `sample`, with Keys' cubic through four pixels each way (a = -0.75, as OpenCV):
+
+    1.25 |x|^3 - 2.25 |x|^2 + 1 up to 1, -0.75 |x|^3 + 3.75 |x|^2 - 6 |x| + 3 up to 2, then 0
+    """
+    rows, columns = plane.shape[:2]
+    padded = np.pad(
+        plane.astype(np.float64),
+        [(3, 3), (3, 3)] + [(0, 0)] * (plane.ndim - 2),
+        constant_values=black,
+    )
+    x = np.clip(np.nan_to_num(pixels[..., 0], nan=-2.0), -2, columns + 1) + 3
+    y = np.clip(np.nan_to_num(pixels[..., 1], nan=-2.0), -2, rows + 1) + 3
+    x0, y0 = np.floor(x).astype(int), np.floor(y).astype(int)
+    total = np.zeros((*x.shape, *plane.shape[2:]))
+    for j in range(-1, 3):
+        for i in range(-1, 3):
+            weight = _cubic(x - (x0 + i)) * _cubic(y - (y0 + j))
+            taken = padded[y0 + j, x0 + i]
+            total += taken * (weight[..., None] if plane.ndim == 3 else weight)
+    return np.clip(np.rint(total), 0, 255).astype(np.uint8)
+
+
+def _cubic(x: Floats) -> Floats:
+    x = np.abs(x)
+    near = (1.25 * x - 2.25) * x * x + 1
+    far = ((-0.75 * x + 3.75) * x - 6) * x + 3
+    return np.where(x < 1, near, np.where(x < 2, far, 0.0))
 
 
 def _at_scale(pixels: Floats, scale: int) -> Floats:

@@ -8,6 +8,10 @@
 //   #define FISHEYE       the whole fisheye picture as it is, instead of the view
 //   #define BENT          the lens is not round: lens_offsets is used
 //   #define COORDINATES   instead of colour: picture x and y in pixels, t, alpha
+//   #define PLANE         instead of colour: the plane in `luma` as it is
+//   #define ANTIALIAS     more samples where the view shrinks the picture
+//   #define BICUBIC       sharper than bilinear where it enlarges
+//   #define VIEWER        makes up for the lens of a viewer in front of the screen
 //
 // Pixels: (0, 0) is the middle of the top-left one. The projection is defined in camera.py.
 
@@ -41,6 +45,13 @@ uniform vec3 yuv_offset;
 #else
 uniform sampler2D luma;            // red, green, blue
 #endif
+#ifdef PLANE
+uniform float plane_scale;         // how many times smaller than the picture
+uniform vec4 plane_black;
+#endif
+#ifdef VIEWER
+uniform vec2 viewer_k;             // of r^2 and r^4, r in focal lengths of the view
+#endif
 
 out vec4 fragment;
 
@@ -51,19 +62,94 @@ float inside(vec2 pixel) {
     return cover.x * cover.y;
 }
 
-vec3 picture(vec2 pixel) {
-    vec2 at = (pixel + 0.5) / vec2(textureSize(luma, 0));
-#if defined(PLANES) || defined(NV12)
-    // A chroma sample sits in the middle of its 2 x 2 luma pixels, also at an odd border.
-    vec2 chroma_at = (pixel + 0.5) / vec2(2 * textureSize(chroma_u, 0));
-#ifdef NV12
-    vec2 uv = texture(chroma_u, chroma_at).rg;
-#else
-    vec2 uv = vec2(texture(chroma_u, chroma_at).r, texture(chroma_v, chroma_at).r);
+// From pixels of the picture to those of a plane `scale` times smaller: a chroma sample sits in
+// the middle of its 2 x 2 luma pixels, also at an odd border.
+vec2 in_plane(vec2 pixel, float scale) {
+    return (pixel + 0.5) / scale - 0.5;
+}
+
+#ifdef BICUBIC
+// Weights of four neighbours: Keys' cubic with a = -0.75, as OpenCV's.
+vec4 cubic(float part) {
+    vec4 far = abs(vec4(part + 1.0, part, 1.0 - part, 2.0 - part));
+    vec2 outer = ((-0.75 * far.xw + 3.75) * far.xw - 6.0) * far.xw + 3.0;
+    vec2 inner = (1.25 * far.yz - 2.25) * far.yz * far.yz + 1.0;
+    return vec4(outer.x, inner, outer.y);
+}
+
+vec4 sharp(sampler2D plane, vec2 pixel) {
+    vec2 low = floor(pixel);
+    vec4 across = cubic(pixel.x - low.x), down = cubic(pixel.y - low.y);
+    ivec2 first = ivec2(low) - 1, last = textureSize(plane, 0) - 1;
+    vec4 sum = vec4(0.0);
+    for (int j = 0; j < 4; j++)
+        for (int i = 0; i < 4; i++)
+            sum += across[i] * down[j]
+                 * texelFetch(plane, clamp(first + ivec2(i, j), ivec2(0), last), 0);
+    return clamp(sum, 0.0, 1.0);
+}
 #endif
-    return clamp(rgb_from_yuv * (vec3(texture(luma, at).r, uv) - yuv_offset), 0.0, 1.0);
+
+#ifdef ANTIALIAS
+// How much of a view pixel's spread a bilinear sample, itself a pixel wide, does not yet cover.
+vec2 uncovered(vec2 right, vec2 down) {
+    return sqrt(max(vec2(dot(right, right), dot(down, down)) - 1.0, 0.0));
+}
+
+// The mean over a view pixel: up to 8 x 4 samples, from a smaller level of the texture (if it has
+// any) where those would lie more than a pixel apart.
+vec4 spread(sampler2D plane, vec2 pixel, vec2 right, vec2 down) {
+    vec2 reach = uncovered(right, down);
+    float most = max(reach.x, reach.y), least = min(reach.x, reach.y);
+    float level = log2(max(1.0, max(most / 8.0, least / 4.0)));
+    ivec2 taps = ivec2(clamp(ceil(reach / exp2(level)), vec2(2.0), vec2(8.0)));
+    taps -= ivec2(equal(reach, vec2(0.0)));
+    right *= reach.x / max(length(right), 1e-6);
+    down *= reach.y / max(length(down), 1e-6);
+    vec2 size = vec2(textureSize(plane, 0));
+    vec4 sum = vec4(0.0);
+    for (int j = 0; j < taps.y; j++)
+        for (int i = 0; i < taps.x; i++) {
+            vec2 place = (vec2(i, j) + 0.5) / vec2(taps) - 0.5;
+            vec2 at = pixel + right * place.x + down * place.y + 0.5;
+            sum += textureLod(plane, at / size, level);
+        }
+    return sum / float(taps.x * taps.y);
+}
+#endif
+
+// A plane at one of its pixels, which moves by `right` and `down` from one view pixel to the next.
+vec4 taken(sampler2D plane, vec2 pixel, vec2 right, vec2 down) {
+#ifdef ANTIALIAS
+    vec2 reach = uncovered(right, down);
+    float shrinks = clamp(max(reach.x, reach.y), 0.0, 1.0);
+#ifdef BICUBIC
+    if (shrinks == 0.0) return sharp(plane, pixel);
+    vec4 wide = spread(plane, pixel, right, down);
+    return shrinks < 1.0 ? mix(sharp(plane, pixel), wide, shrinks) : wide;
 #else
-    return texture(luma, at).rgb;
+    if (shrinks > 0.0) return spread(plane, pixel, right, down);
+#endif
+#endif
+#ifdef BICUBIC
+    return sharp(plane, pixel);
+#else
+    return textureLod(plane, (pixel + 0.5) / vec2(textureSize(plane, 0)), 0.0);
+#endif
+}
+
+vec3 picture(vec2 pixel, vec2 right, vec2 down) {
+#if defined(PLANES) || defined(NV12)
+    vec2 there = in_plane(pixel, 2.0), next = 0.5 * right, below = 0.5 * down;
+#ifdef NV12
+    vec2 uv = taken(chroma_u, there, next, below).rg;
+#else
+    vec2 uv = vec2(taken(chroma_u, there, next, below).r, taken(chroma_v, there, next, below).r);
+#endif
+    float y = taken(luma, pixel, right, down).r;
+    return clamp(rgb_from_yuv * (vec3(y, uv) - yuv_offset), 0.0, 1.0);
+#else
+    return taken(luma, pixel, right, down).rgb;
 #endif
 }
 
@@ -81,7 +167,7 @@ void main() {
     vec3 sum = vec3(0.0);
     for (int i = 0; i < 4; i++) {
         vec2 tap = pixel + picture_from_pixel.xy * (vec2(i & 1, i >> 1) - 0.5) * 0.5;
-        sum += picture(tap) * inside(tap);
+        sum += picture(tap, vec2(0.0), vec2(0.0)) * inside(tap);
     }
     fragment = shown(sum / 4.0);
 }
@@ -114,19 +200,37 @@ vec2 offset_at(vec2 p) {
 #endif
 }
 
+// Where the view is shown at `here`, so that a viewer's lens brings it back to its place.
+vec2 through_viewer(vec2 here) {
+#ifdef VIEWER
+    vec2 off = (here - view_center) / view_focal_px;
+    float r2 = dot(off, off);
+    return view_center + (here - view_center) * (1.0 + r2 * (viewer_k.x + r2 * viewer_k.y));
+#else
+    return here;
+#endif
+}
+
 void main() {
     vec2 here = pixel_from_fragment.xy * gl_FragCoord.xy + pixel_from_fragment.zw;
+    here = through_viewer(here);
     vec3 ray = camera_from_view * vec3((here - view_center) / view_focal_px, 1.0);
     float size = length(ray);
     float depth = max(size + ray.z, 1e-5 * size);  // 0 straight behind, where no lens sees
     vec2 p = ray.xy / depth;
     float t = ray.z > 0.0 ? dot(p, p) : (size - ray.z) / depth;  // the same; each where exact
     vec2 pixel = lens_center + lens_stretch * (p * g_at(t) + offset_at(p));
+#ifdef PLANE
+    pixel = in_plane(pixel, plane_scale);
+#endif
+    vec2 right = dFdx(pixel), down = dFdy(pixel);
     float alpha = clamp((lens_t_max - t) / max(fwidth(t), 1e-12) + 0.5, 0.0, 1.0) * inside(pixel);
 #ifdef COORDINATES
     fragment = vec4(pixel, t, alpha);
+#elif defined(PLANE)
+    fragment = mix(plane_black, taken(luma, pixel, right, down), alpha);
 #else
-    fragment = shown(picture(pixel) * alpha);
+    fragment = shown(picture(pixel, right, down) * alpha);
 #endif
 }
 
