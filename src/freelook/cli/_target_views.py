@@ -51,12 +51,20 @@ class Found:
         self.size = size
 
 
-def find_views(inputs: Sequence[str], target: Target, *, quiet: bool = False) -> Found:
+def find_views(
+    inputs: Sequence[str],
+    target: Target,
+    *,
+    size: tuple[int, int] | None = None,
+    quiet: bool = False,
+) -> Found:
     """The target's views in pictures, videos and corner files, in this order.
+
+    `size`: of the pictures that corner files are of, where those do not say it.
 
     CalibrationError names inputs of different sizes; SourceError those that cannot be read.
     """
-    from ..calibration.corner_files import is_corner_file, read_corner_files
+    from ..formats.corners import is_corner_file, read_corner_files
     from ..media.pictures import is_picture
 
     found = Found()
@@ -72,9 +80,10 @@ def find_views(inputs: Sequence[str], target: Target, *, quiet: bool = False) ->
     for name in videos:
         _search_video(name, target, found, quiet)
     if corners:
-        views, size = read_corner_files(corners)
-        found.of_size(corners[0], size)
-        found.views += views
+        known = read_corner_files(corners, target, size)
+        found.of_size(corners[0], known.size)
+        found.views += known.views
+        found.without += known.without
     return found
 
 

@@ -4,7 +4,7 @@
   freelook calibrate shots/*.jpg --board 6x8 --square 0.0325 -o lens.json --report report.html
   freelook calibrate shots/*.jpg --target charuco:10x7:0.024:0.018 -o lens.json
   freelook calibrate board.mp4 --model auto -o lens.json                    from a video
-  freelook calibrate corners/*.orpc --json                                  from known corners
+  freelook calibrate corners.vnl --board 10x10 --square 0.05 --size 1920x1080    known corners
   freelook calibrate --live /dev/video0 -o lens.json                        with a page that guides
 
 Hold the board close, so that it fills much of the picture, in 10 to 20 places: the middle, all
@@ -23,6 +23,7 @@ import numpy as np
 
 from ..errors import CalibrationError, FreelookError
 from ..lens import MODELS
+from ._arguments import size
 from ._calibrate_live import add_live_arguments, run_live
 from ._profile_text import profile_text
 from ._targets import add_target_arguments, chosen_target
@@ -41,6 +42,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=("auto", *MODELS),
         metavar="NAME",
         help="lens model, or auto: the one that predicts unseen views best",
+    )
+    parser.add_argument(
+        "--size", type=size, metavar="WxH", help="of the pictures, for corner files that lack it"
     )
     parser.add_argument("--skew", action="store_true", help="solve for skewed pixels too")
     parser.add_argument("--square-pixels", action="store_true", help="take pixels as square")
@@ -72,7 +76,7 @@ def _run(args: argparse.Namespace, target: Target) -> int:
 
     if not args.inputs:
         raise CalibrationError("give pictures, videos or corner files, or --live SOURCE")
-    found = find_views(args.inputs, target, quiet=args.json)
+    found = find_views(args.inputs, target, size=args.size, quiet=args.json)
     if not found.views:
         raise CalibrationError(_nothing_found(found))
     assert found.size is not None
