@@ -1,8 +1,8 @@
 """Other programs' calibrations, called as their documentation says, their results as our cameras.
 
 A peer takes views, the picture's size and the board's spacing, and returns a `Camera` or raises
-`PeerFailed` with its reason. None gets a guess but the ones that cannot do without: those get a
-focal length of width / pi by hand, and say so in their name.
+`PeerFailed` with its reason. None gets a guess but the ones that cannot do without: those get the
+focal length of a lens that shows 180 degrees over the picture's width.
 """
 
 from __future__ import annotations
@@ -102,14 +102,18 @@ class OpenCVOmnidir:
 
 @dataclass(frozen=True)
 class MrcalSplined:
-    """`mrcal-calibrate-cameras` with its splined stereographic model, on a cache of corners."""
+    """`mrcal-calibrate-cameras` with its splined stereographic model, on a cache of corners.
 
+    It starts from a stereographic lens that shows 180 degrees over the width. How many control
+    points a set can carry its user has to know.
+    """
+
+    control: tuple[int, int]
     field_deg: int = 200
-    control: tuple[int, int] = (16, 12)
 
     @property
     def name(self) -> str:
-        return "mrcal splined, f = width / pi by hand"
+        return f"mrcal splined, {self.control[0]} x {self.control[1]}"
 
     def missing(self) -> str:
         return "" if shutil.which("mrcal-calibrate-cameras") else "mrcal is not installed"
@@ -124,7 +128,7 @@ class MrcalSplined:
         with tempfile.TemporaryDirectory() as folder:
             Path(folder, "corners.vnl").write_text(corner_cache(grids), "utf-8")
             command = ["mrcal-calibrate-cameras", "--corners-cache", "corners.vnl"]
-            command += ["--lensmodel", model, "--focal", f"{size[0] / np.pi:.1f}"]
+            command += ["--lensmodel", model, "--focal", f"{size[0] / 4:.1f}"]
             command += ["--object-spacing", f"{spacing:.9g}", "--object-width-n", str(shape[0])]
             command += ["--object-height-n", str(shape[1]), "--outdir", "."]
             command += ["--imagersize", *map(str, size), "view*.png"]
@@ -148,7 +152,8 @@ PEERS: tuple[Peer, ...] = (
     OpenCVFisheye(guess=False),
     OpenCVFisheye(guess=True),
     OpenCVOmnidir(),
-    MrcalSplined(),
+    MrcalSplined((16, 12)),
+    MrcalSplined((10, 8)),
 )
 
 

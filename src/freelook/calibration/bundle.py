@@ -29,6 +29,7 @@ from .views import Pose, View
 
 __all__ = [
     "Adjusted",
+    "BoardProblem",
     "Problem",
     "Solution",
     "State",
@@ -106,7 +107,7 @@ def solve(
     A view with fewer than 4 points that count keeps its pose and counts for nothing.
     CalibrationError when the views do not determine the camera.
     """
-    problem = _Problem(views, camera, freedom or Freedom())
+    problem = BoardProblem(views, camera, freedom or Freedom())
     state = State.of(problem.parameters.values, poses)
     with np.errstate(all="ignore"):  # steps may lead anywhere; what is no number is not taken
         if robust:
@@ -136,7 +137,7 @@ def resect_all(
     By plain least squares over the points that are true in `counted`, (n,) a view; None: all.
     `robust` instead by points that fit, with one noise for all views.
     """
-    problem = _Problem(views, camera, KNOWN)
+    problem = BoardProblem(views, camera, KNOWN)
     state = State.of(np.zeros(0), poses)
     with np.errstate(all="ignore"):
         if robust:
@@ -151,7 +152,7 @@ def resect_all(
 KNOWN = Freedom(lens=False, center=False, aspect=False)
 
 
-class _Problem:
+class BoardProblem:
     """The views stacked, and what a row of values means."""
 
     def __init__(self, views: Sequence[View], camera: Camera, freedom: Freedom) -> None:
@@ -364,7 +365,7 @@ def _together(inverse: Floats, each: Floats, right: Floats, variance: float) -> 
     return float(np.sqrt(max(1.0, seen / (variance * own)))) if variance * own > 1e-9 else 1.0
 
 
-def _solution(problem: _Problem, state: State, weights: Floats) -> Solution:
+def _solution(problem: BoardProblem, state: State, weights: Floats) -> Solution:
     known = _known(problem, state, weights)
     return Solution(
         problem.parameters.camera_of(state.values),

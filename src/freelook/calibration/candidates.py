@@ -3,9 +3,10 @@
 Every candidate is solved robustly, by itself. Then one of them says which points count for all:
 the one nearest to most points (least median residual). Were each to drop its own, a poor model
 would look good by having dropped what it cannot explain. On these points every candidate is solved
-again by plain least squares and cross-validated: the camera is solved without a fifth of the views
-at a time, those views only get their pose, and their residuals tell how the model does on pictures
-it has not seen. A model with more parameters fits better and predicts worse once it is too much.
+again by plain least squares and cross-validated (see `left_out`): the camera is solved without a
+fifth of the views at a time, those views only get their pose, and their residuals tell how the
+model does on pictures it has not seen. A model with more parameters fits better and predicts worse
+once it is too much.
 
 Taken is the model with the fewest parameters that predicts within 1 % of the best. Not within one
 standard error, as is often done: a lens model is wrong mostly at the rim, where few views reach,
@@ -24,8 +25,10 @@ from ..camera import Camera, make_camera
 from ..errors import CalibrationError, FreelookError
 from ..fitting.refit import refit
 from ..lens import MODELS, Lens, RadialSpline, growth_limit
-from .bundle import Solution, resect_all, rms, solve
+from .bundle import Solution, solve
 from .field import MARGIN, angles, seen_angle
+from .left_out import cross_validate
+from .nearby import nearby
 from .parameters import HELD, Freedom, lens_names
 from .views import View
 
@@ -46,7 +49,6 @@ AUTO = (
 WORTH_IT = 0.99
 OUT_OF_THE_RACE = 1.5  # times the best RMS: what fits so badly need not be tested further
 OVERFIT = 1.3  # times the RMS on views left out
-FOLDS = 5
 BEYOND = np.radians(0.5)  # of a model's end: more than the first lens may be off there
 FEW_FOLDED = 0.02  # of the points that count
 KNOT_EVERY_DEG = 12.0
@@ -142,37 +144,6 @@ def chosen(candidates: Sequence[Candidate]) -> Candidate:
     return min(near, key=_parameters)
 
 
-def cross_validate(solution: Solution, views: Sequence[View], freedom: Freedom) -> float:
-    """RMS in pixels (2-D, per point) on views that the camera was solved without.
-
-    The points that count are the solution's. NaN with fewer than 3 views, and where those that
-    are left do not determine the camera.
-    """
-    used = [i for i, ok in enumerate(solution.inliers) if ok.any()]
-    if len(used) < 3:
-        return float("nan")
-    folds, errors = min(FOLDS, len(used)), []
-    for fold in range(folds):
-        held_out = used[fold::folds]
-        kept = [i for i in used if i not in held_out]
-        try:
-            camera = solve(
-                solution.camera,
-                [solution.poses[i] for i in kept],
-                [views[i] for i in kept],
-                freedom,
-                robust=False,
-                counted=[solution.inliers[i] for i in kept],
-            ).camera
-        except CalibrationError:
-            return float("nan")
-        counted = [solution.inliers[i] for i in held_out]
-        poses, held = [solution.poses[i] for i in held_out], [views[i] for i in held_out]
-        residuals = resect_all(camera, poses, held, counted)[1]
-        errors += [r[ok] for r, ok in zip(residuals, counted, strict=True)]
-    return rms(np.concatenate(errors))
-
-
 def _alone(
     model: str, views: Sequence[View], base: Solution, freedom: Freedom, drop: bool
 ) -> Candidate:
@@ -239,6 +210,9 @@ def _start(name: str, base: Solution, seen: float, freedom: Freedom) -> Camera:
     )
     if name == "radial_spline":
         return replace(base.camera, lens=_spline_like(known.lens, grows))
+    close = nearby(name, known.lens, grows)
+    if close is not None:
+        return replace(base.camera, lens=close)
     try:
         stretch, held = "aspect" if freedom.aspect else "none", HELD.get(MODELS[name], ())
         near = refit(known, name, stretch=stretch, held=held).camera

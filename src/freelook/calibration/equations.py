@@ -89,6 +89,16 @@ class Equations:
             products[:, k:-1, -1],
         )
 
+    def only(self, parts: list[int]) -> Equations:
+        """Of some parts."""
+        return Equations(
+            self.camera[parts],
+            self.between[parts],
+            self.poses[parts],
+            self.camera_right[parts],
+            self.poses_right[parts],
+        )
+
     @property
     def sound(self) -> bool:
         """Whether all of it are numbers: near the end of a formula some are not."""

@@ -9,12 +9,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..camera import Camera
-from ..lens import Floats, Lens, image_point, radius_slope
+from ..lens import Floats, Lens, RadialSpline, image_point, radius_slope
 from .parameters import Parameters, difference_step, lens_values, with_lens_values
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 INSIDE = 1 - 1e-6  # of the angle where a formula ends
 
@@ -85,22 +89,52 @@ class _Polar:
 
 def _lands(lens: Lens, bent: bool, polar: _Polar) -> Floats:
     """(n, 2) pixels from the axis, before the stretch."""
-    theta = np.minimum(polar.theta, lens.hard_limit * INSIDE)
     if bent:
-        return image_point(lens, theta, np.arctan2(polar.outwards[:, 1], polar.outwards[:, 0]))
-    return np.asarray(lens.radius(theta)[:, None] * polar.outwards)
+        around = np.arctan2(polar.outwards[:, 1], polar.outwards[:, 0])
+        return image_point(lens, _within(lens, polar.theta), around)
+    return np.asarray(_radius(lens, polar.theta)[:, None] * polar.outwards)
 
 
 def _lens_slopes(lens: Lens, bent: bool, polar: _Polar) -> list[Floats]:
     """d (landing place) / d (parameter) (n, 2), for each parameter of the lens."""
+    if isinstance(lens, RadialSpline):  # its radius is linear in its radii
+        bumps = _bumps(lens.angles_deg)(_within(lens, polar.theta))
+        return [bump[:, None] * polar.outwards for bump in bumps.T]
     values, slopes = lens_values(lens), []
     for i, value in enumerate(values):
         step = np.zeros(len(values))
         step[i] = difference_step(value)
         ahead, behind = with_lens_values(lens, values + step), with_lens_values(lens, values - step)
-        change = _lands(ahead, bent, polar) - _lands(behind, bent, polar)
+        if bent:
+            change = _lands(ahead, bent, polar) - _lands(behind, bent, polar)
+        else:
+            longer = _radius(ahead, polar.theta) - _radius(behind, polar.theta)
+            change = longer[:, None] * polar.outwards
         slopes.append(change / (2 * step[i]))
     return slopes
+
+
+def _within(lens: Lens, theta: Floats) -> Floats:
+    return np.minimum(theta, lens.hard_limit * INSIDE)
+
+
+def _radius(lens: Lens, theta: Floats) -> Floats:
+    return lens.radius(_within(lens, theta))
+
+
+@cache
+def _bumps(angles_deg: tuple[float, ...]) -> CubicSpline:
+    """d r(theta) / d radii_px of a radial spline with these knots: (n,) to (n, knots)."""
+    from scipy.interpolate import CubicSpline
+
+    knots = np.radians(angles_deg)
+    each = np.eye(len(knots))
+    if knots[0] == 0:  # stays 0
+        knots, each = knots[1:], each[1:]
+    middle = np.zeros((1, each.shape[1]))
+    return CubicSpline(
+        np.concatenate([-knots[::-1], [0.0], knots]), np.concatenate([-each[::-1], middle, each])
+    )
 
 
 def _round_slopes(lens: Lens, polar: _Polar) -> Floats:

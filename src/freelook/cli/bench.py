@@ -130,7 +130,7 @@ def _calibration_figures(row: Row) -> dict[str, Any]:
     for key in ("skipped", "failed"):
         if said := getattr(row, key):
             return {**figures, key: said}
-    for key in ("rms_px", "cross_validated_px", "seconds"):
+    for key in ("rms_px", "cross_validated_px", "seconds", "cpu_seconds"):
         value = float(getattr(row, key))
         figures[key] = value if isfinite(value) else None
     return figures
@@ -143,20 +143,24 @@ def _print_calibrations(rows: list[Row]) -> None:
     for name in dict.fromkeys(row.set for row in rows):
         table = Table(title=name)
         table.add_column("way")
-        for column in ("RMS px", "on views left out, px", "seconds"):
+        for column in ("RMS px", "left out px", "seconds", "of CPU"):
             table.add_column(column, justify="right")
         for row in rows:
             if row.set != name:
                 continue
             if row.skipped or row.failed:
                 said = f"skipped: {row.skipped}" if row.skipped else f"failed: {row.failed}"
-                table.add_row(f"{row.way}\n  {said}", "", "", "")
+                table.add_row(f"{row.way}\n  {said}", "", "", "", "")
             else:
                 predicted = row.cross_validated_px
                 held_out = f"{predicted:.3f}" if isfinite(predicted) else ""
-                table.add_row(row.way, f"{row.rms_px:.3f}", held_out, f"{row.seconds:.2f}")
+                times = (f"{row.seconds:.2f}", f"{row.cpu_seconds:.2f}")
+                table.add_row(row.way, f"{row.rms_px:.3f}", held_out, *times)
         Console().print(table)
-    print("RMS: 2-D, per point, each view with the pose that suits the way's camera best")
+    print(
+        "RMS: 2-D, per point, each view with the pose that suits the way's camera best;\n"
+        "left out: the same on views that the way's camera was calibrated without"
+    )
 
 
 def _latency(args: argparse.Namespace) -> int:
