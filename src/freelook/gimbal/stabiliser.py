@@ -170,7 +170,7 @@ class Stabiliser:
         why = self._why_not(attitude, t_ns, now_ns)
         self._settle(why, now_ns)
         target = NOTHING
-        if self._usable and attitude is not None:
+        if self._usable and attitude is not None and self._mode != "body":
             target = attitude.inv() * self._world_from_base(heading_deg, now_ns)
         kind = (self._usable, self._choice)
         if self._kind is not None and (kind != self._kind or jumped):
@@ -244,8 +244,6 @@ class Stabiliser:
     # --- where the base looks
 
     def _world_from_base(self, heading_deg: float, now_ns: int) -> Rotation:
-        if self._mode == "body":
-            raise AssertionError("the body's base needs no world")
         if self._mode == "horizon":
             return level(heading_deg)
         if self._mode == "follow":
