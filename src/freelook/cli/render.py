@@ -26,6 +26,7 @@ from ..viewport import Viewport
 from ._arguments import size
 from ._cameras import add_lens_arguments, mounted_camera
 from ._circles import camera_by_circle
+from ._renderers import add_renderer_arguments, opened_renderer
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -48,6 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--size", type=size, default=(1280, 720), metavar="WxH", help="of the view (1280x720)"
     )
+    add_renderer_arguments(parser)
     parser.add_argument("--overwrite", action="store_true", help="replace OUT if it exists")
 
 
@@ -123,12 +125,11 @@ def _write(
     audio_from: str | None = None,
 ) -> None:
     from ..offline import render_recording
-    from ..renderers.cpu import CpuRenderer
     from ..sinks import open_sink
     from ._bars import bar
 
     mailbox: Mailbox[Frame] = Mailbox()
-    session = Session(mailbox, camera, aim, CpuRenderer(), viewport)
+    session = Session(mailbox, camera, aim, opened_renderer(args), viewport)
     sink = open_sink(
         args.output,
         size=viewport.size,
