@@ -6,10 +6,12 @@ import json
 
 import pytest
 
-from freelook.bench import render, video_latency
+from freelook.bench import render, render_gl, video_latency
 from freelook.bench.figures import Figure
 from freelook.bench.page_latency import PageLog, frame_figures, pose_latencies
 from freelook.cli import main
+from freelook.egl import best_device
+from freelook.errors import MissingExtra
 from freelook.latency import TIME_BITS, check_bits
 
 SMALL = render.Case("a small view", (320, 240), (64, 48))
@@ -17,6 +19,7 @@ SMALL = render.Case("a small view", (320, 240), (64, 48))
 
 def test_every_way_is_timed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("shutil.which", lambda _name: None)
+    monkeypatch.setattr(render, "gl_ways", lambda _scene: [])
     steps: list[int] = []
     ours, floor, opencv, ffmpeg = render.run(SMALL, 30, 1, lambda: steps.append(1))
     assert [len(t.times_ms) for t in (ours, floor, opencv)] == [30, 30, 30]
@@ -38,11 +41,35 @@ def test_bench_render_prints_json(
 ) -> None:
     monkeypatch.setattr(render, "CASES", (SMALL,))
     monkeypatch.setattr("shutil.which", lambda _name: None)
+    monkeypatch.setattr(render, "gl_ways", lambda _scene: [("OpenGL", "not here")])
     assert main(["bench", "render", "--rounds", "15", "--threads", "1", "--json"]) == 0
     rows = json.loads(capsys.readouterr().out)["cases"][SMALL.name]
-    assert [row["way"] for row in rows] == [render.OURS, render.FLOOR, render.OPENCV, render.FFMPEG]
+    ways = [render.OURS, render.FLOOR, render.OPENCV, render.FFMPEG, "OpenGL"]
+    assert [row["way"] for row in rows] == ways
     assert rows[0]["times_ours"] == 1.0
     assert rows[3]["skipped"] == "ffmpeg is not installed"
+    assert rows[4]["skipped"] == "not here"
+
+
+def test_opengl_is_timed_and_named_by_what_draws() -> None:
+    pytest.importorskip("moderngl")
+    if (device := best_device()) is None:
+        pytest.skip("no OpenGL here")
+    scene = render.make_scene(SMALL)
+    rows = render_gl.gl_ways(scene)
+    assert [name.partition("\n")[0] for name, _ in rows] == [render_gl.READ_BACK, render_gl.DRAWN]
+    for name, way in rows:
+        assert not isinstance(way, str)
+        assert device.renderer in name
+        assert ("software: " in name) == device.software
+        way(next(render.poses(0, 1)))
+
+
+def test_without_opengl_its_rows_say_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(render_gl, "has_moderngl", lambda: False)
+    monkeypatch.setattr(render_gl, "best_device", lambda: None)
+    rows = render_gl.gl_ways(render.make_scene(SMALL))
+    assert [why for _, why in rows] == [str(MissingExtra("moderngl", "gl"))] * 2
 
 
 def log(frames: list[tuple[float, float, str]], draws: list[tuple[float, float]]) -> PageLog:

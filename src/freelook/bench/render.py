@@ -25,6 +25,7 @@ from ..renderers.cpu import CpuRenderer, coordinates
 from ..rotations import RDF_FROM_FRD, body_from_view
 from ..types import Picture, Plane
 from ..viewport import Viewport
+from .render_gl import gl_ways
 
 FIELD_DEG = 188.0
 TURN = 15
@@ -45,6 +46,7 @@ CASES = (
     Case("720p view out of 2880x2160", (2880, 2160), (1280, 720)),
     Case("1080p view out of 3840x2160", (3840, 2160), (1920, 1080)),
 )
+LARGE = Case("4K view out of 7680x4320", (7680, 4320), (3840, 2160))
 
 
 @dataclass
@@ -81,11 +83,14 @@ def run(case: Case, rounds: int, threads: int, on_round: Callable[[], None]) -> 
     """Time every way for about `rounds` poses on `threads` cores; ours first."""
     cv2.setNumThreads(threads)
     scene = make_scene(case)
-    ways: list[tuple[Timing, Way]] = [
-        (Timing(OURS), _ours(scene, threads)),
-        (Timing(FLOOR), _floor(scene)),
-        (Timing(OPENCV), _opencv(scene)),
-    ]
+    ways: list[tuple[Timing, Way]] = [(Timing(OURS), _ours(scene, threads))]
+    skipped: list[Timing] = []
+    for name, way in gl_ways(scene):
+        if isinstance(way, str):
+            skipped.append(Timing(name, skipped=way))
+        else:
+            ways.append((Timing(name), way))
+    ways += [(Timing(FLOOR), _floor(scene)), (Timing(OPENCV), _opencv(scene))]
     for turn in range(turns(rounds) + 1):
         for number in range(len(ways)):
             timing, work = ways[(number + turn) % len(ways)]
@@ -95,7 +100,7 @@ def run(case: Case, rounds: int, threads: int, on_round: Callable[[], None]) -> 
                 if turn:  # the first turn compiles and warms up
                     timing.times_ms.append((time.perf_counter() - start) * 1e3)
         on_round()
-    return [*(timing for timing, _ in ways), ffmpeg_v360(case, threads)]
+    return [*(timing for timing, _ in ways), ffmpeg_v360(case, threads), *skipped]
 
 
 def turns(rounds: int) -> int:

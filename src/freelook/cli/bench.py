@@ -34,6 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     render.add_argument(
         "--threads", type=int, default=os.cpu_count() or 1, metavar="N", help="cores to use"
     )
+    render.add_argument("--large", action="store_true", help="a 4K view out of an 8K picture too")
     render.add_argument("--json", action="store_true", help="print the figures as JSON")
     render.set_defaults(bench=_render)
     latency = what.add_parser("latency", help="stamp to picture, head to changed picture")
@@ -60,11 +61,11 @@ def run(args: argparse.Namespace) -> int:
 def _render(args: argparse.Namespace) -> int:
     from rich.console import Console
 
-    from ..bench.render import CASES, run, turns
+    from ..bench.render import CASES, LARGE, run, turns
     from ._bars import bar
 
     figures = {}
-    for case in CASES:
+    for case in (*CASES, LARGE) if args.large else CASES:
         with bar(case.name, turns(args.rounds) + 1, "turns", quiet=args.json) as advance:
             timings = run(case, args.rounds, args.threads, advance)
         if not args.json:
