@@ -113,7 +113,7 @@ def setting(text: str) -> tuple[str, float]:
 
 
 def run(args: argparse.Namespace) -> int:
-    from ..duel.contest import fight, questions
+    from ..duel.contest import fight, steps
     from ..duel.figures import changed, figures, settings_of
     from ..formats import load_camera
     from ._bars import bar
@@ -131,8 +131,8 @@ def run(args: argparse.Namespace) -> int:
     say(f"  {_expected(settings)}")
     found = []
     for head in heads:
-        total = questions(head, settings, ours is not None, theirs is not None)
-        with bar(head.name, total or None, "predictions", quiet=not total) as advance:
+        total = steps(head, settings, ours is not None, theirs is not None)
+        with bar(head.name, total, "steps") as advance:
             duel = fight(head, settings, ours, theirs, advance)
         found.append(duel)
         for line in _table(duel, field_deg):

@@ -36,6 +36,8 @@ DETUNED = {
     "display": 1.0,
 }
 
+SEED = 2011
+
 Advance = Callable[[], None]
 
 
@@ -70,6 +72,17 @@ class MotorTrace:
         return body_from_angles(np.stack([angle_at(axis, t_ns) for axis in self.angles_deg]))
 
 
+def tracked(head: HeadMotion, settings: Settings) -> tuple[Times, Rotation]:
+    """What the head tracker says, the same to both sides: times (n,) and poses (n)."""
+    taken = ticks(head.duration_ns, settings.tracker_period_ms * DETUNED["tracker"])
+    poses = head.at(taken)
+    if settings.tracker_noise_deg:
+        noise = np.random.default_rng(SEED).standard_normal((len(taken), 3))
+        noise *= np.radians(settings.tracker_noise_deg)
+        poses = poses * Rotation.from_rotvec(noise)
+    return taken, poses
+
+
 def freelook_chain(
     head: HeadMotion,
     settings: Settings,
@@ -78,12 +91,11 @@ def freelook_chain(
 ) -> Shown:
     """freelook's way. With a predictor the page draws for the middle of the time it is seen."""
     end_ns = head.duration_ns
-    taken = ticks(end_ns, settings.tracker_period_ms * DETUNED["tracker"])
+    taken, poses = tracked(head, settings)
     there = later(taken, settings.tracker_delay_ms + settings.station_delay_ms)
     drawn = ticks(end_ns, settings.refresh_ms)
     frame_ms = settings.refresh_ms * settings.compositor_frames
     seen = later(drawn, frame_ms + settings.display_ms)
-    poses = head.at(taken)
     if predictor is None:
         directions = poses[newest(there, drawn)]
     else:
@@ -103,10 +115,9 @@ def gimbal_chain(
     """The gimbal's way. With a predictor it is sent where the head is expected when it is seen,
     as far as that is known beforehand: all delays but the motors' own."""
     end_ns = head.duration_ns
-    taken = ticks(end_ns, settings.tracker_period_ms * DETUNED["tracker"])
+    taken, poses = tracked(head, settings)
     there = later(taken, settings.tracker_delay_ms)
     handed = ticks(end_ns, settings.trainer_period_ms * DETUNED["trainer"])
-    poses = head.at(taken)
     if predictor is None:
         sent = poses[newest(there, handed)]
     else:

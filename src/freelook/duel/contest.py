@@ -108,15 +108,17 @@ def _both(
     advance: Advance,
 ) -> tuple[dict[str, Shown], MotorTrace]:
     ours = freelook_chain(head, settings, freelook_predictor and freelook_predictor(), advance)
+    advance()
     theirs, motors = gimbal_chain(head, settings, gimbal_predictor and gimbal_predictor(), advance)
+    advance()
     return {"freelook": ours, "gimbal": theirs}, motors
 
 
-def questions(head: HeadMotion, settings: Settings, freelook: bool, gimbal: bool) -> int:
-    """How often `fight` calls `advance`: once for every prediction."""
+def steps(head: HeadMotion, settings: Settings, freelook: bool, gimbal: bool) -> int:
+    """How often `fight` calls `advance`, about: for every prediction and every chain."""
     total_ms = (head.duration_ns + turns_head().duration_ns) / 1e6
     asked = freelook * total_ms / settings.refresh_ms
-    return round(asked + gimbal * total_ms / settings.trainer_period_ms)
+    return 4 + round(asked + gimbal * total_ms / settings.trainer_period_ms)
 
 
 def _side(head: HeadMotion, shown: Shown, turns: HeadMotion, turned: Shown) -> Side:

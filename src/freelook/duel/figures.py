@@ -35,6 +35,7 @@ class Settings:
     Head tracker, the same for both:
     tracker_period_ms     between two samples
     tracker_delay_ms      from a sample to its pose, in the tracker
+    tracker_noise_deg     rms of each sample about each axis, independent of the one before
 
     freelook's station:
     station_delay_ms      from the tracker's output to the page
@@ -63,6 +64,7 @@ class Settings:
 
     tracker_period_ms: float
     tracker_delay_ms: float
+    tracker_noise_deg: float
     station_delay_ms: float
     compositor_frames: float
     digitiser_ms: float
@@ -166,6 +168,7 @@ _ELRS = "mavlinkhud.com field manual, ExpressLRS at 250 Hz"
 HEAD: Preset = {
     "tracker_period_ms": Figure(6.67, "dlktdr/HeadTracker, firmware: sensors at 150 Hz"),
     "tracker_delay_ms": Figure(3.5, "dlktdr/HeadTracker, firmware: half of its 7 ms cycle"),
+    "tracker_noise_deg": Figure(0.02, "assumed: a fused MEMS sensor at rest"),
     "station_delay_ms": Figure(3.0, "docs/latency.md: datagram to drawn, quiet machine"),
     "compositor_frames": Figure(1, "a browser's picture is shown one display frame later"),
 }
@@ -188,7 +191,7 @@ GIMBALS: dict[str, Preset] = {
         "axes": Figure(3, "Caddx GM3"),
     },
     "payload": {
-        "command_period_ms": Figure(20, "MAVLink set-points at 50 Hz"),
+        "command_period_ms": Figure(20, "assumed: MAVLink set-points at 50 Hz"),
         "command_delay_ms": Figure(1, "assumed: a serial frame"),
         "slew_deg_s": Figure(100, "data of the Gremsy G-Hadron: controlled rotation"),
         "accel_deg_s2": Figure(1_000, "assumed: full speed after 100 ms"),
@@ -199,7 +202,7 @@ GIMBALS: dict[str, Preset] = {
 
 LINKS: dict[str, Preset] = {
     "analogue": {
-        "trainer_period_ms": Figure(22.5, "PPM frame of the trainer port"),
+        "trainer_period_ms": Figure(22.5, "the usual PPM frame of a trainer port"),
         "radio_period_ms": Figure(9, f"{_FPORT}: 111 Hz"),
         "radio_latency_ms": Figure(19.7, f"{_FPORT}: 19.7 ms mean"),
         "camera_hz": Figure(50, "fields of PAL"),
@@ -254,5 +257,6 @@ def changed(chosen: Mapping[str, Figure], changes: Mapping[str, float]) -> dict[
 
 
 def ideal(settings: Settings) -> Settings:
-    """The same with motors that are wherever they are told to be, for tests and comparisons."""
-    return replace(settings, slew_deg_s=math.inf, accel_deg_s2=math.inf, dead_band_deg=0.0)
+    """The same with motors that are wherever they are told to be, and a tracker without noise."""
+    motors = replace(settings, slew_deg_s=math.inf, accel_deg_s2=math.inf, dead_band_deg=0.0)
+    return replace(motors, tracker_noise_deg=0.0)

@@ -125,7 +125,8 @@ def _rows(path: Path, lines: list[str]) -> tuple[Floats, Floats]:
 
 def _cleaned(path: Path, times_s: Floats, wxyz: Floats) -> tuple[Times, Rotation]:
     fresh = np.ones(len(times_s), dtype=np.bool_)
-    fresh[1:] = np.abs(np.diff(wxyz, axis=0)).max(axis=1) > 0
+    before, after = wxyz[:-1], wxyz[1:]  # q and -q are one rotation
+    fresh[1:] = (before != after).any(axis=1) & (before != -after).any(axis=1)
     times = np.rint((times_s[fresh] - times_s[0]) * NS_PER_S).astype(np.int64)
     steps = np.diff(times)
     if (steps < 0).any():

@@ -8,7 +8,7 @@ are the limits that its data sheet states.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import copysign, inf, isinf, sqrt
+from math import ceil, copysign, inf, isinf, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,12 +56,9 @@ def _follow(motor: Motor, position: float, targets: list[float]) -> list[float]:
         error = target - position
         moving = moving or abs(error) > dead_band
         if moving:
-            distance = abs(error)
-            wanted = min(slew, distance / dt)
+            wanted = min(slew, abs(error) / dt)
             if not unlimited:
-                # the fastest from which it can still stop there, in whole steps of dt:
-                # distance = gain dt n (n + 1) / 2, n steps from the end
-                wanted = min(wanted, gain * (sqrt(0.25 + 2 * distance / (gain * dt)) - 0.5))
+                wanted = min(wanted, gain * _stoppable(abs(error) / (gain * dt)))
             change = copysign(wanted, error) - speed
             speed += change if unlimited else min(max(change, -gain), gain)
             position += speed * dt
@@ -69,6 +66,15 @@ def _follow(motor: Motor, position: float, targets: list[float]) -> list[float]:
             speed = speed if moving else 0.0
         positions.append(position)
     return positions
+
+
+def _stoppable(distance: float) -> float:
+    """The fastest speed from which, slowing down by 1 each step, one stops after `distance` > 0.
+
+    From speed u in n = ceil(u) steps: u + (u - 1) + ... = n u - n (n - 1) / 2.
+    """
+    count = max(1, ceil(sqrt(0.25 + 2 * distance) - 0.5))
+    return distance / count + (count - 1) / 2
 
 
 def angle_at(positions_deg: Floats, t_ns: Times) -> Floats:

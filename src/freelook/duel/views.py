@@ -17,7 +17,7 @@ from ..camera import Camera
 from ..clock import NS_PER_S
 from ..color import rgb_from_picture, to_codes
 from ..renderers.cpu import CpuRenderer
-from ..simulation.camera import SimulatedCamera, pixel_deg
+from ..simulation.camera import Flight, SimulatedCamera, pixel_deg
 from ..simulation.flight import FigureEight
 from ..simulation.world import World
 from ..types import Frame, Picture
@@ -42,7 +42,7 @@ class SideBySide:
     viewport: Viewport
     labels: tuple[str, str]
     threads: int = 1
-    flight: FigureEight = field(default_factory=FigureEight)
+    flight: Flight = field(default_factory=FigureEight)
 
     def __post_init__(self) -> None:
         world = World(pixel_deg(self.camera))
