@@ -19,7 +19,9 @@ STEEP_DEG_S = 180.0
 
 def nose(world_from_body: Rotation) -> tuple[float, float]:
     """(heading, elevation) of the body's x axis, degrees: from north through east, and up."""
-    north, east, down = (float(value) for value in world_from_body.apply([1.0, 0.0, 0.0]))
+    x, y, z, w = (float(value) for value in world_from_body.as_quat())
+    # the first column of the rotation's matrix
+    north, east, down = 1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)
     level = math.hypot(north, east)
     heading = math.degrees(math.atan2(east, north)) if level > 1e-9 else 0.0
     return heading, math.degrees(math.atan2(-down, level))

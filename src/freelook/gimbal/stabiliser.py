@@ -18,6 +18,7 @@ at once: the view stays, and eases to where it belongs.
 
 from __future__ import annotations
 
+import math
 import threading
 from bisect import bisect_right
 from dataclasses import dataclass
@@ -270,4 +271,6 @@ class Stabiliser:
 def level(heading_deg: float, elevation_deg: float = 0.0) -> Rotation:
     """North, east, down from axes that head there without roll, the first one so far above the
     horizon."""
-    return Rotation.from_euler("ZY", [heading_deg, elevation_deg], degrees=True)
+    yaw, pitch = math.radians(heading_deg) / 2, math.radians(elevation_deg) / 2
+    (sin_y, cos_y), (sin_p, cos_p) = ((math.sin(half), math.cos(half)) for half in (yaw, pitch))
+    return Rotation.from_quat([-sin_y * sin_p, cos_y * sin_p, sin_y * cos_p, cos_y * cos_p])
