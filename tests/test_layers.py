@@ -17,7 +17,7 @@ LAYERS: list[set[str]] = [
     | {"attitude_track", "rate_integration"}
     | {"color", "datagrams", "latency", "plugins"},
     {"renderers", "gimbal", "prediction", "simulation", "media", "fitting", "plots", "calibration"}
-    | {"resolution", "view_cost", "comparison", "duel"},
+    | {"alignment", "stabilisation", "resolution", "view_cost", "comparison", "duel"},
     {"sources", "trackers", "attitudes", "sinks", "formats"},
     {"ingest", "head", "session", "offline"},
     {"cli", "web", "bench", "paper", "report", "doctor", "egl"},
