@@ -159,7 +159,8 @@ def test_what_is_refused(
     assert "one view is not enough" in refused(capsys, shots[0])
     said = refused(capsys, *shots, small)
     assert "320 x 240 pixels, the pictures before it are 640 x 480" in said
-    assert "the target was found in none of 1 inputs" in refused(capsys, empty)
+    said = refused(capsys, empty)
+    assert "the target (chessboard:1) was found in none of 1 inputs" in said
     assert f"{taken} exists; --overwrite" in refused(capsys, *shots, "-o", str(taken))
     assert taken.read_text() == "mine"
     assert "give pictures, videos or corner files" in refused(capsys)

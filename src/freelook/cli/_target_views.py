@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 from ..calibration.choice import differing, moved_px
+from ..calibration.mistakes import is_blurred
 from ..calibration.targets import Gray, Target
 from ..calibration.views import View
 from ..errors import CalibrationError
@@ -23,12 +24,14 @@ class Found:
 
     pictures  of the views, by name: gray; for reports
     without   names of pictures without the target
+    blurred   those of them that are blurred
     size      of all pictures
     """
 
     views: list[View] = field(default_factory=list)
     pictures: dict[str, Gray] = field(default_factory=dict)
     without: list[str] = field(default_factory=list)
+    blurred: list[str] = field(default_factory=list)
     size: tuple[int, int] | None = None
 
     def add(self, name: str, gray: Gray, view: View | None) -> None:
@@ -36,6 +39,8 @@ class Found:
         self.of_size(name, size)
         if view is None:
             self.without.append(name)
+            if is_blurred(gray):
+                self.blurred.append(name)
         else:
             self.views.append(view)
             self.pictures[name] = gray

@@ -70,6 +70,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _run(args: argparse.Namespace, target: Target) -> int:
     from ..calibration.calibrate import calibrate
+    from ..calibration.mistakes import check_different, other_size, with_turned_told
     from ..calibration.parameters import Freedom
     from ..calibration.words import figures
     from ._target_views import find_views
@@ -78,8 +79,9 @@ def _run(args: argparse.Namespace, target: Target) -> int:
         raise CalibrationError("give pictures, videos or corner files, or --live SOURCE")
     found = find_views(args.inputs, target, size=args.size, quiet=args.json)
     if not found.views:
-        raise CalibrationError(_nothing_found(found))
+        raise CalibrationError(_nothing_found(found, target))
     assert found.size is not None
+    check_different(found.views, found.size)
     freedom = Freedom(aspect=not args.square_pixels, skew=args.skew)
     say = (
         (lambda _: None) if args.json else (lambda what: print(f"solving: {what}", file=sys.stderr))
@@ -87,10 +89,15 @@ def _run(args: argparse.Namespace, target: Target) -> int:
     calibration = calibrate(
         found.views, found.size, args.model, freedom, drop=not args.keep_all, progress=say
     )
+    calibration = with_turned_told(calibration, found.views)
+    wrong_size = other_size(target, found.views, found.pictures)
     if args.json:
-        print(json.dumps(figures(calibration, found.without), indent=2))
+        said = {"target": target.text, "target_doubt": wrong_size, "blurred": found.blurred}
+        print(json.dumps(figures(calibration, found.without) | said, indent=2))
     else:
         _print(calibration, found)
+        if wrong_size:
+            print(wrong_size)
     if args.output:
         _write(args, calibration)
     if args.report:
@@ -102,11 +109,16 @@ def _run(args: argparse.Namespace, target: Target) -> int:
     return 0
 
 
-def _nothing_found(found: Found) -> str:
+def _nothing_found(found: Found, target: Target) -> str:
     shown = ", ".join(found.without[:5]) + (" ..." if len(found.without) > 5 else "")
+    why = "is it wholly or mostly in the picture, sharp, flat, evenly lit, with a light margin?"
+    if found.blurred:
+        why = f"{len(found.blurred)} of them are blurred: focus, hold the board still, more light"
+    elif target.named:
+        why += " Are its numbers and its markers as on the print?"
     return (
-        f"the target was found in none of {len(found.without)} inputs ({shown}); is it wholly or "
-        "mostly in the picture, sharp, flat, evenly lit, with a light margin?"
+        f"the target ({target.text}) was found in none of {len(found.without)} inputs ({shown}); "
+        f"{why}"
     )
 
 
@@ -118,7 +130,8 @@ def _print(calibration: Calibration, found: Found) -> None:
     from ..calibration.words import sentences
 
     for name in found.without:
-        print(f"{name}: target not found", file=sys.stderr)
+        blurred = "; the picture is blurred" if name in found.blurred else ""
+        print(f"{name}: target not found{blurred}", file=sys.stderr)
     console = Console()
     solution = calibration.solution
     views = Table(title="views")
