@@ -211,7 +211,7 @@ def test_after_recentre_turning_the_head_is_a_pure_yaw(
 @pytest.mark.parametrize("value", [-0.1, float("nan"), float("inf"), 4000])
 def test_impossible_times_are_refused(field: str, value: float) -> None:
     with pytest.raises(TrackerError, match=f"{field} must be 0 to 3600 seconds"):
-        GimbalSettings(**{field: value})
+        GimbalSettings(**{field: value})  # type: ignore[arg-type]
 
 
 def test_with_times_of_zero_only_the_rate_is_left() -> None:
