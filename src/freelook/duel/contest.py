@@ -125,7 +125,7 @@ def _side(head: HeadMotion, shown: Shown, turns: HeadMotion, turned: Shown) -> S
     t_ns = measure.moments(head)
     delays = measure.turn_delays_ms(turns, turned)
     percent = {
-        f"{level * 100:.0f}": (float(np.median(column)), float(np.percentile(column, 95)))
+        f"{level * 100:.0f}": (_of_sorted(column, 0.5), _of_sorted(column, 0.95))
         for level, column in zip(measure.LEVELS, delays.T, strict=True)
     }
     return Side(
@@ -135,6 +135,11 @@ def _side(head: HeadMotion, shown: Shown, turns: HeadMotion, turned: Shown) -> S
         turn_ms=percent,
         picture_age_ms=measure.spread(shown.age_ms(t_ns)),
     )
+
+
+def _of_sorted(values: Floats, share: float) -> float:
+    """The value that this share of all reaches at most; one of them, so that it may be infinite."""
+    return float(np.sort(values)[round(share * (len(values) - 1))])
 
 
 def _plain(value: Any) -> Any:

@@ -21,6 +21,7 @@ Times = NDArray[np.int64]
 HEADER = ("timestamp", "viewpoint", "w", "x", "y", "z")
 LEAST_STEP_NS = 1_000_000
 SYNTHETIC_SECONDS = 60.0
+TURNS = 24
 
 # recordings: x forward, y left, z up, for the head and for the room
 _FRD_FROM_FLU = Rotation.from_quat([1.0, 0.0, 0.0, 0.0])
@@ -159,7 +160,7 @@ def synthetic_head(seconds: float = SYNTHETIC_SECONDS, seed: int = 2011) -> Head
     return HeadMotion("synthetic head", np.rint(times * NS_PER_S).astype(np.int64), poses)
 
 
-def turns_head(count: int = 40, size_deg: float = 60.0, turn_s: float = 0.4) -> HeadMotion:
+def turns_head(count: int = TURNS, size_deg: float = 60.0, turn_s: float = 0.4) -> HeadMotion:
     """Turns of the head to and fro about the vertical, one every 1.6 s and a bit, so that they
     meet every clock at every phase. The profile is that of minimum jerk: Hogan (1984)."""
     times = np.arange(0, round(count * 163 + 100)) / 100.0
@@ -171,7 +172,7 @@ def turns_head(count: int = 40, size_deg: float = 60.0, turn_s: float = 0.4) -> 
     return HeadMotion("turns", np.rint(times * NS_PER_S).astype(np.int64), poses)
 
 
-def turn_starts_s(count: int = 40) -> Floats:
+def turn_starts_s(count: int = TURNS) -> Floats:
     """When the turns of `turns_head` begin: on its 10 ms grid, at ever other fractions of 16 ms."""
     return np.round(1.0 + np.arange(count) * 1.61, 2)
 

@@ -40,7 +40,8 @@ def drive(motor: Motor, command_ns: Times, command_deg: Floats, end_ns: int) -> 
     It begins at rest at the first command. A command counts from its time on.
     """
     steps = np.arange(end_ns // STEP_NS, dtype=np.int64) * STEP_NS
-    targets = command_deg[newest(command_ns, steps)]
+    # what comes within a step counts from its beginning: no time is lost to the steps on average
+    targets = command_deg[newest(command_ns, steps + STEP_NS - 1)]
     return np.array(_follow(motor, float(command_deg[0]), targets.tolist()))
 
 
