@@ -19,8 +19,8 @@ LAYERS: list[set[str]] = [
     {"renderers", "gimbal", "prediction", "simulation", "media", "fitting", "plots", "calibration"}
     | {"alignment", "stabilisation", "resolution", "view_cost", "comparison", "duel"},
     {"sources", "trackers", "attitudes", "sinks", "formats"},
-    {"ingest", "head", "session", "offline"},
-    {"cli", "web", "bench", "paper", "report", "doctor", "egl"},
+    {"ingest", "head", "vehicle", "session", "offline"},
+    {"cli", "web", "window", "bench", "paper", "report", "doctor", "egl"},
 ]
 LAYER_OF = {name: number for number, names in enumerate(LAYERS) for name in names}
 PLUG_INS = LAYERS[3]

@@ -27,7 +27,7 @@ State = Literal["ok", "warn", "no"]
 
 # what freelook cannot fly without; the other extras add to it
 ESSENTIAL_EXTRAS = ("render", "video", "web")
-EXTRAS = (*ESSENTIAL_EXTRAS, "rtsp", "cli", "gl")
+EXTRAS = (*ESSENTIAL_EXTRAS, "rtsp", "cli", "gl", "window")
 HARDWARE_ENCODERS = ("h264_nvenc", "h264_vaapi", "h264_qsv", "h264_amf", "h264_videotoolbox")
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "firefox", "microsoft-edge")
 PORTS = (

@@ -2,6 +2,11 @@
 
 The video goes to the browser untouched wherever the browser can decode it; the page turns the
 view with the newest head pose. Stop with Ctrl-C.
+
+  freelook fly /dev/video0 --lens lens.json
+  freelook fly camera.sdp --lens lens.json --tracker opentrack --show window --monitor 2
+
+With --show window the view is drawn on a screen of this machine instead: goggles on HDMI, say.
 """
 
 from __future__ import annotations
@@ -23,6 +28,7 @@ from ..viewport import Viewport
 from ._cameras import add_lens_arguments, mounted_camera
 from ._circles import camera_by_circle
 from ._progress import StatusLine, say
+from ._window import add_window_arguments, fly_in_window
 
 if TYPE_CHECKING:  # the web libraries are slow to load, and may be missing
     from ..ingest import Ingest
@@ -42,7 +48,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_lens_arguments(parser)
     parser.add_argument("--loop", action="store_true", help="play a recording over and over")
+    parser.add_argument(
+        "--show",
+        choices=("page", "window"),
+        default="page",
+        help="a page for browsers, or a window on this machine",
+    )
     add_flying_arguments(parser)
+    add_window_arguments(parser)
 
 
 def add_flying_arguments(parser: argparse.ArgumentParser) -> None:
@@ -103,11 +116,15 @@ def source_kinds() -> list[str]:
 def run(args: argparse.Namespace) -> int:
     from ..ingest import Ingest
     from ..sources import open_source
-    from ..web.station import About
 
     Viewport((16, 9), args.hfov)  # says what is wrong with it before the camera is asked
     camera = mounted_camera(args, lambda fov_deg: camera_by_circle(args.source, fov_deg))
     ingest = Ingest(lambda: open_source(args.source, loop=args.loop))
+    if args.show == "window":
+        fly_in_window(args, ingest, camera)
+        return 0
+    from ..web.station import About
+
     about = About(args.source, False, args.hold, args.ease, args.hfov)
     fly(args, ingest, camera, about, never)
     return 0

@@ -1,0 +1,130 @@
+"""`freelook fly --show window`: its options, and a flight in a window of this machine."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
+
+from ..camera import Camera
+from ..clock import now_ns
+from ..gimbal import GimbalSettings
+from ._arguments import size
+from ._progress import StatusLine, say
+from ._renderers import add_sampling_argument
+
+if TYPE_CHECKING:
+    from ..ingest import Ingest
+    from ..window.ages import Figures
+
+EYES = ("mono", "side-by-side", "top-bottom")
+KEYS = (
+    "drag or arrows look, wheel or + and - zoom, R recentres, E eyes front and back, "
+    "G gives the tracker control again, F full screen, Q or Esc ends"
+)
+
+
+def add_window_arguments(parser: argparse.ArgumentParser) -> None:
+    window = parser.add_argument_group("in a window (--show window)")
+    window.add_argument(
+        "--window-size", type=size, default=(1280, 720), metavar="WxH", help="(1280x720)"
+    )
+    window.add_argument(
+        "--monitor", metavar="N", help="fill this screen at once: its number, or part of its name"
+    )
+    window.add_argument(
+        "--eyes", choices=EYES, default="mono", help="for stereo goggles and viewers"
+    )
+    window.add_argument(
+        "--eye-offset",
+        type=float,
+        default=0.0,
+        metavar="PX",
+        help="move each eye's view towards the nose",
+    )
+    window.add_argument(
+        "--viewer-lens",
+        type=two_numbers,
+        default=(0.0, 0.0),
+        metavar="K1,K2",
+        help="shrink what the lenses of a viewer enlarge: by 1 + K1 r^2 + K2 r^4",
+    )
+    window.add_argument(
+        "--no-vsync", action="store_true", help="do not wait for the screen: sooner, but torn"
+    )
+    add_sampling_argument(parser)
+
+
+def two_numbers(text: str) -> tuple[float, float]:
+    """K1,K2."""
+    try:
+        one, two = (float(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not K1,K2, such as 0.22,0.24") from None
+    return one, two
+
+
+def fly_in_window(args: argparse.Namespace, ingest: Ingest, camera: Camera) -> None:
+    """Until the window is closed or Ctrl-C; then says how old poses were when they were shown."""
+    from ..window.eyes import Optics
+    from ..window.flight import Flight, Outside
+    from ..window.pilot import Pilot
+    from ..window.surface import Surface
+    from .fly import open_heads
+
+    optics = Optics(args.eyes, args.eye_offset, args.viewer_lens)
+    settings = GimbalSettings(hold_s=args.hold, ease_s=args.ease)
+    with contextlib.ExitStack() as opened:
+        surface = opened.enter_context(Surface(args.window_size, args.monitor, not args.no_vsync))
+        say(f"window: drawn by {surface.renderer}")
+        say(KEYS)
+        heads = open_heads(args.tracker, settings, opened)
+        opened.callback(ingest.close)
+        frames = ingest.frames()
+        ingest.start()
+        for head in heads.values():
+            head.start()
+        line = opened.enter_context(StatusLine())
+        outside = Outside(now_ns, opened.enter_context(asked_to_stop()), _report(ingest, line))
+        pilot = Pilot(heads, args.hfov)
+        flight = Flight(surface, frames, camera, pilot, outside, optics, args.sampling)
+        opened.callback(lambda: say(summary(flight.figures)))
+        flight.run()
+
+
+def _report(ingest: Ingest, line: StatusLine) -> Callable[[int], float]:
+    """Says how the source is; the picture greys while it is lost."""
+
+    def grey(at_ns: int) -> float:
+        status = ingest.status(at_ns)
+        line.show("; ".join(filter(None, (f"source: {status.state}", status.message))))
+        return 1.0 if status.state == "lost" else 0.0
+
+    return grey
+
+
+def summary(figures: Figures) -> str:
+    if not figures.views:
+        return "window: no picture was shown"
+    return (
+        f"window: {figures.views} views, {figures.rate_hz:.1f} a second, {figures.missed} late; "
+        f"pose to swap: {figures.pose_to_swap}; pose read to swap: {figures.latch_to_swap}"
+    )
+
+
+@contextlib.contextmanager
+def asked_to_stop() -> Iterator[Callable[[], bool]]:
+    """Whether SIGINT or SIGTERM came: the window is closed then, and all that is open."""
+    asked = threading.Event()
+    before = {
+        number: signal.signal(number, lambda *_: asked.set())
+        for number in (signal.SIGINT, signal.SIGTERM)
+    }
+    try:
+        yield asked.is_set
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

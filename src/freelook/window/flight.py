@@ -1,0 +1,172 @@
+"""The loop of a flight in a window: the newest frame, the pose read as late as possible, swap.
+
+wait until the screen's next picture is nearly due -> take the newest frame to the GPU ->
+read the pose -> draw -> swap, which waits for the screen -> note how old the pose was
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from scipy.spatial.transform import Rotation
+
+from ..camera import Camera
+from ..clock import NS_PER_S, Clock
+from ..errors import SinkError
+from ..mailbox import Mailbox
+from ..renderers.blank import Sampling
+from ..session import same_shape
+from ..types import Frame
+from .ages import Figures
+from .events import Event
+from .eyes import Optics, eyes
+from .pacing import Pacer, period_ns
+from .painting import EyesPainter
+from .pilot import Pilot
+from .surface import Surface
+
+IDLE_S = 0.02  # how soon a new frame is noticed while nothing moves
+STATUS_S = 0.25
+
+
+@dataclass(frozen=True)
+class Outside:
+    """What the loop asks of the world: the clock, whether to stop, how far the video is lost
+    (0 live, 1 lost)."""
+
+    clock: Clock
+    stop: Callable[[], bool]
+    grey: Callable[[int], float] = lambda _now_ns: 0.0
+
+
+class Flight:
+    """Shows `frames` on `surface`, turned by `pilot`."""
+
+    def __init__(
+        self,
+        surface: Surface,
+        frames: Mailbox[Frame],
+        camera: Camera,
+        pilot: Pilot,
+        outside: Outside,
+        optics: Optics | None = None,
+        sampling: Sampling = "bilinear",
+    ) -> None:
+        self.figures = Figures()
+        self._surface = surface
+        self._frames = frames
+        self._camera = camera
+        self._pilot = pilot
+        self._outside = outside
+        self._optics = Optics() if optics is None else optics
+        self._painter = EyesPainter(surface.context, self._optics, sampling)
+        self._pacer = Pacer(period_ns(surface.refresh_hz))
+        self._frame: Frame | None = None
+        self._shown: tuple[object, ...] = ()
+        self._shown_pose_ns: int | None = None
+        self._grey, self._grey_ns = 0.0, -NS_PER_S
+        self._ending = False
+
+    def run(self) -> Figures:
+        """Until the window is closed, Q is pressed or `stop` says so.
+
+        SinkError when the display goes away. What was measured until then is in `figures`.
+        """
+        while not self._outside.stop() and not self._ending:
+            self._await_turn()
+            if self._surface.lost:
+                raise SinkError("the display went away, and the window with it")
+            if not self._view():
+                self._pacer.paused()
+                self._handle(self._surface.events(IDLE_S))
+        self.figures.missed = self._pacer.missed
+        return self.figures
+
+    def _await_turn(self) -> None:
+        """Events are taken meanwhile, so that the last look at them is short."""
+        while (left_ns := self._left_ns()) > 0 and not self._surface.lost:
+            self._handle(self._surface.events(left_ns / NS_PER_S))
+            if self._ending or self._outside.stop():
+                return
+        self._handle(self._surface.events())
+
+    def _left_ns(self) -> int:
+        now_ns = self._outside.clock()
+        return self._pacer.begin_ns(now_ns) - now_ns
+
+    def _handle(self, events: list[Event]) -> None:
+        eye = eyes(self._optics, self._surface.size_points)[0]
+        for asked in self._pilot.take(events, self._outside.clock(), (eye.width, eye.height)):
+            if asked == "quit":
+                self._ending = True
+            else:
+                self._surface.toggle_full_screen()
+                self._pacer = Pacer(period_ns(self._surface.refresh_hz), self._pacer.missed)
+
+    def _view(self) -> bool:
+        """Draw and show one view; false when it would be the one that is shown already."""
+        begun_ns = self._outside.clock()
+        fresh = self._frames.take()
+        frame = self._frame = fresh or self._frame
+        size, grey = self._surface.size_px, self._grey_at(begun_ns)
+        if frame is None or min(size) < 4:
+            return False
+        camera, hfov_deg = self._camera_for(frame), self._pilot.hfov_deg
+        if fresh:
+            self._painter.load(frame.picture, camera, size, hfov_deg)
+        self._handle(self._surface.events())
+        latched_ns = self._outside.clock()
+        self._pilot.advance(latched_ns, self._surface.pad())
+        look = self._pilot.look(latched_ns)
+        hfov_deg = self._pilot.hfov_deg
+        shown = (id(frame), size, hfov_deg, grey, tuple(look.body_from_view.as_quat()))
+        if shown == self._shown:
+            return False
+        self._draw(frame, camera, look.body_from_view, size, hfov_deg, grey)
+        drawn_ns = self._outside.clock()
+        self._surface.swap()
+        self._surface.context.finish()  # drivers may return from a swap before it is done
+        swapped_ns = self._outside.clock()
+        self._shown = shown
+        self._note(begun_ns, latched_ns, drawn_ns, swapped_ns, look.pose_ns)
+        return True
+
+    def _draw(
+        self,
+        frame: Frame,
+        camera: Camera,
+        body_from_view: Rotation,
+        size: tuple[int, int],
+        hfov_deg: float,
+        grey: float,
+    ) -> None:
+        camera_from_view = camera.camera_from_body * body_from_view
+        self._painter.load(frame.picture, camera, size, hfov_deg)  # again only after a zoom
+        self._painter.paint(self._surface.screen, size, camera, camera_from_view, hfov_deg, grey)
+        self._surface.context.finish()
+
+    def _note(
+        self, begun_ns: int, latched_ns: int, drawn_ns: int, swapped_ns: int, pose_ns: int | None
+    ) -> None:
+        self._pacer.swapped(begun_ns, drawn_ns, swapped_ns)
+        figures = self.figures
+        figures.views += 1
+        figures.first_ns = figures.first_ns or swapped_ns
+        figures.last_ns = swapped_ns
+        figures.latch_to_swap.add(swapped_ns - latched_ns)
+        if pose_ns is not None and pose_ns != self._shown_pose_ns:
+            figures.pose_to_swap.add(swapped_ns - pose_ns)
+            self._shown_pose_ns = pose_ns
+
+    def _grey_at(self, now_ns: int) -> float:
+        if now_ns - self._grey_ns >= STATUS_S * NS_PER_S:
+            self._grey, self._grey_ns = self._outside.grey(now_ns), now_ns
+        return self._grey
+
+    def _camera_for(self, frame: Frame) -> Camera:
+        """Frames of another size are the camera's whole picture scaled, as in a session."""
+        size = frame.picture.size
+        if size != self._camera.size and same_shape(size, self._camera.size):
+            self._camera = self._camera.resized(size)
+        return self._camera
