@@ -244,9 +244,22 @@ def test_the_attitude_is_the_one_at_capture_not_the_newest() -> None:
         stabiliser.push(Attitude(t_ns, flown(roll=step * 0.5)))
     base = stabiliser.at(2 * NS_PER_S, 1_880 * NS_PER_MS)
     assert head_angles_deg(view(base))[2] == pytest.approx(-44)
-    stabiliser.video_delay_ns = 200 * NS_PER_MS
-    late = stabiliser.at(2 * NS_PER_S + 1, 1_900 * NS_PER_MS)
-    assert head_angles_deg(view(late))[2] == pytest.approx(-35)
+    glance = stabiliser.at(2 * NS_PER_S, 1_500 * NS_PER_MS)
+    assert head_angles_deg(view(glance))[2] == pytest.approx(-25)
+    assert stabiliser.newest is base, "an older frame changes nothing"
+
+
+def test_an_offset_says_when_a_frame_was_really_taken() -> None:
+    stabiliser = steady("horizon", flown())
+    for step in range(101):
+        t_ns = NS_PER_S + step * PERIOD_NS
+        stabiliser.push(Attitude(t_ns, flown(roll=step * 0.5)))
+    stabiliser.set_offset(-200 * NS_PER_MS)
+    eased = stabiliser.at(2 * NS_PER_S, 1_900 * NS_PER_MS)
+    assert head_angles_deg(view(eased))[2] == pytest.approx(0)
+    assert eased.moving
+    there = stabiliser.at(3 * NS_PER_S, 1_900 * NS_PER_MS)
+    assert head_angles_deg(view(there))[2] == pytest.approx(-35)
 
 
 def test_without_a_capture_time_the_last_frame_counts() -> None:

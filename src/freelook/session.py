@@ -11,14 +11,16 @@ from dataclasses import dataclass
 from scipy.spatial.transform import Rotation
 
 from .camera import Camera
+from .gimbal import LensLimit
 from .mailbox import Mailbox
 from .renderers import Renderer
 from .rotations import FRD_FROM_RDF
 from .types import Frame, Picture
 from .viewport import Viewport
 
-Aim = Callable[[int], Rotation]
-"""`body_from_view` for a time in nanoseconds."""
+Aim = Callable[[int, int], Rotation]
+"""`body_from_view` for the time at which a view is displayed, and for that at which the frame it
+shows was taken; both in nanoseconds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +42,8 @@ class Session:
     """Points a viewport into the newest frame.
 
     Frames of another size than the camera's are taken as the camera's whole picture scaled, if
-    they have its shape; otherwise `step` raises RenderError, as the renderer does.
+    they have its shape; otherwise `step` raises RenderError, as the renderer does. With `limit`
+    the view stays inside the lens; without, what the lens does not see is black.
     """
 
     def __init__(
@@ -50,8 +53,10 @@ class Session:
         aim: Aim,
         renderer: Renderer,
         viewport: Viewport,
+        limit: LensLimit | None = None,
     ) -> None:
         self.viewport = viewport
+        self._limit = limit
         self._frames = frames
         self._camera = camera
         self._aim = aim
@@ -65,7 +70,9 @@ class Session:
         if frame is None:
             return None
         camera = self._camera_for(frame.picture)
-        body_from_view = self._aim(now_ns)
+        body_from_view = self._aim(now_ns, frame.capture_ns)
+        if self._limit is not None:
+            body_from_view = self._limit(body_from_view, self.viewport, now_ns)
         picture = self._renderer.render(
             frame.picture, camera, camera.camera_from_body * body_from_view, self.viewport
         )

@@ -3,6 +3,7 @@
   freelook render flight.mp4 left.mp4 --lens cam.json --yaw -35 --pitch 20 --hfov 80
   freelook render flight.mp4 view.mp4 --lens cam.json --poses head.csv --size 1920x1080
   freelook render shot.png view.png --lens cam.json --yaw 30
+  freelook render flight.mp4 level.mp4 --lens cam.json --mode horizon --attitude flight.ulg
 
 Frame times and sound are kept. Interrupted with Ctrl-C, what was written plays.
 """
@@ -13,10 +14,13 @@ import argparse
 import itertools
 import os
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+
+from scipy.spatial.transform import Rotation
 
 from ..camera import Camera
 from ..errors import FreelookError, SourceError
+from ..gimbal import LensLimit
 from ..mailbox import Mailbox
 from ..pose_script import read_script
 from ..rotations import body_from_view
@@ -27,6 +31,7 @@ from ._arguments import size
 from ._cameras import add_lens_arguments, mounted_camera
 from ._circles import camera_by_circle
 from ._renderers import add_renderer_arguments, opened_renderer
+from ._stabilising import add_mode_arguments, stabiliser_from_log
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -49,6 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--size", type=size, default=(1280, 720), metavar="WxH", help="of the view (1280x720)"
     )
+    add_mode_arguments(parser)
     add_renderer_arguments(parser)
     parser.add_argument("--overwrite", action="store_true", help="replace OUT if it exists")
 
@@ -57,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
     from ..media.pictures import is_picture
 
     viewport = Viewport(args.size, args.hfov)
-    aim = _aim(args)
+    aim = _Aim(args)
     if os.path.realpath(args.input) == os.path.realpath(args.output):
         raise FreelookError("IN and OUT are the same file; name another OUT")
     camera = mounted_camera(args, lambda fov_deg: camera_by_circle(args.input, fov_deg))
@@ -65,10 +71,33 @@ def run(args: argparse.Namespace) -> int:
         _render_picture(args, camera, aim, viewport)
     else:
         _render_video(args, camera, aim, viewport)
+    aim.report(args.output)
     return 0
 
 
-def _aim(args: argparse.Namespace) -> Aim:
+class _Aim:
+    """The head's direction in the stabilised base; times are the video's."""
+
+    def __init__(self, args: argparse.Namespace) -> None:
+        self.degraded = 0
+        self.notice = ""
+        self._head = _head(args)
+        self._stabiliser = stabiliser_from_log(args)
+
+    def __call__(self, now_ns: int, _capture_ns: int) -> Rotation:
+        base = self._stabiliser.at(now_ns, now_ns)
+        if base.state == "degraded":
+            self.degraded += 1
+            self.notice = self.notice or base.notice
+        return base.body_from_base * self._head(now_ns)
+
+    def report(self, output: str) -> None:
+        """Say on how many frames the mode was not possible, if on any."""
+        if self.degraded:
+            print(f"{output}: in {self.degraded} frames {self.notice}", file=sys.stderr)
+
+
+def _head(args: argparse.Namespace) -> Callable[[int], Rotation]:
     if args.poses is None:
         fixed = body_from_view(args.yaw, args.pitch, args.roll)
         return lambda _now_ns: fixed
@@ -129,7 +158,8 @@ def _write(
     from ._bars import bar
 
     mailbox: Mailbox[Frame] = Mailbox()
-    session = Session(mailbox, camera, aim, opened_renderer(args), viewport)
+    limit = LensLimit(camera) if args.limit == "soft" else None
+    session = Session(mailbox, camera, aim, opened_renderer(args), viewport, limit)
     sink = open_sink(
         args.output,
         size=viewport.size,

@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 import threading
 from bisect import bisect_right
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from scipy.spatial.transform import Rotation
 
@@ -39,6 +39,7 @@ MODES = ("body", "horizon", "world", "follow", "point")
 LEAST_JUMP_DEG = 3.0  # less between two attitudes is noise, or a jitter of their times
 JOINED_S = 0.5  # attitudes farther apart than this say nothing about a jump
 JUMPS_KEPT = 1000
+LARGE_OFFSET_NS = 5_000_000  # at 100 degrees a second, half a degree
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,8 @@ BODY = Base()
 
 
 class Stabiliser:
-    """Asked in the order of time; what is older than the last question gets the last answer.
+    """Asked in the order of time. A frame from before the last one that was asked about is
+    answered too, and leaves everything as it was.
 
     Safe between threads: attitudes come on one, questions on others.
     """
@@ -78,9 +80,9 @@ class Stabiliser:
         self, settings: StabiliserSettings | None = None, buffer: AttitudeBuffer | None = None
     ) -> None:
         self.settings = StabiliserSettings() if settings is None else settings
-        self.video_delay_ns = 0
         self._buffer = AttitudeBuffer() if buffer is None else buffer
         self._lock = threading.RLock()
+        self._offset_ns = 0
         self._mode = "body"
         self._target: Target | None = None
         self._here: tuple[int, Location] | None = None
@@ -107,6 +109,20 @@ class Stabiliser:
     def newest(self) -> Base:
         """The last answer."""
         return self._newest
+
+    @property
+    def offset_ns(self) -> int:
+        """Attitude time = capture time + this: from where the video comes late, or its clock is
+        another, to when the vehicle really was so."""
+        return self._offset_ns
+
+    def set_offset(self, offset_ns: int) -> None:
+        """Use another offset from the next question on; one that is much different is eased."""
+        with self._lock:
+            if abs(offset_ns - self._offset_ns) > LARGE_OFFSET_NS:
+                self._choice += 1
+                self._heading.restart()
+            self._offset_ns = offset_ns
 
     def set_mode(self, mode: str, target: Target | None = None) -> None:
         """Choose a mode, from the next question on. *World* chosen again takes the heading anew.
@@ -152,13 +168,15 @@ class Stabiliser:
             if capture_ns is None:
                 capture_ns = last_capture_ns if self._asked else now_ns
             now_ns = max(now_ns, last_now_ns)
+            if capture_ns < last_capture_ns and self._asked:
+                return self._glance(now_ns, capture_ns)
             if self._asked != (now_ns, capture_ns):
                 self._newest = self._answer(now_ns, capture_ns)
                 self._asked = (now_ns, capture_ns)
             return self._newest
 
     def _answer(self, now_ns: int, capture_ns: int) -> Base:
-        t_ns = capture_ns - self.video_delay_ns
+        t_ns = capture_ns + self._offset_ns
         attitude = self._buffer.at(t_ns)
         jumped = self._jumped(t_ns)
         if attitude is not None:
@@ -178,6 +196,15 @@ class Stabiliser:
             self._blend = self._eased(self._newest.body_from_base, target, now_ns)
         self._kind = kind
         return self._compose(target, why, jumped, now_ns)
+
+    def _glance(self, now_ns: int, capture_ns: int) -> Base:
+        """The base for a frame from before the last one asked about: changes nothing."""
+        t_ns = capture_ns + self._offset_ns
+        attitude = self._buffer.at(t_ns)
+        if not self._usable or attitude is None or self._mode == "body":
+            return self._newest
+        target = attitude.inv() * self._world_from_base(self._heading.at(t_ns, attitude), now_ns)
+        return replace(self._newest, body_from_base=self._blend.left(now_ns) * target)
 
     def _compose(self, target: Rotation, why: str, jumped: bool, now_ns: int) -> Base:
         moving = self._blend.active(now_ns)
@@ -238,7 +265,7 @@ class Stabiliser:
         """Whether the attitude jumped between the last question's time and this one's."""
         if not self._jumps or self._asked is None:
             return False
-        last_ns = self._asked[1] - self.video_delay_ns
+        last_ns = self._asked[1] + self._offset_ns
         before = bisect_right(self._jumps, (t_ns, LONG_AGO_NS)) - 1
         return t_ns > last_ns and before >= 0 and self._jumps[before][1] > last_ns
 
