@@ -60,3 +60,9 @@ def test_help_names_every_kind(capsys: pytest.CaptureFixture[str]) -> None:
     ]
     kinds = [example for example in examples if ":" in example]
     assert [parse_target(example).text.split(":")[0] for example in kinds] == list(KINDS)
+
+
+def test_every_kind_has_its_row_in_the_documentation() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "calibration.md").read_text("utf-8")
+    for kind in KINDS.values():
+        assert f" | `{kind.usage}` | " in page

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import subprocess
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -368,6 +369,15 @@ def test_mrcal_reads_the_same(tmp_path: Path) -> None:
         there = theirs[:, 2] > 0
         assert view.pixels == pytest.approx(theirs[there, :2], abs=1e-9)
         assert view.points.tolist() == TARGET.points[there].tolist()
+
+
+def test_every_format_has_its_row_in_the_documentation() -> None:
+    page = Path(__file__).parents[2] / "docs" / "calibration.md"
+    for name in FORMATS:
+        module = import_module(f"freelook.formats.corners.{name}")
+        endings = " ".join(f"`{suffix}`" for suffix in module.SUFFIXES)
+        row = f"| {endings} | {(module.__doc__ or '').splitlines()[0]} |"
+        assert row in page.read_text("utf-8"), row
 
 
 @pytest.mark.data
