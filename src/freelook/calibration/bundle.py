@@ -98,11 +98,13 @@ def solve(
     robust: bool = True,
     counted: Sequence[Bools] | None = None,
     steps: int = STEPS,
+    enough: float = ENOUGH,
 ) -> Solution:
     """Adjust everything, starting from a camera and poses that are about right.
 
     robust   False counts every point fully, or those that are true in `counted`, (n,) a view
     steps    bounds each minimisation
+    enough   relative gain of a step that is the last
 
     A view with fewer than 4 points that count keeps its pose and counts for nothing.
     CalibrationError when the views do not determine the camera.
@@ -111,10 +113,10 @@ def solve(
     state = State.of(problem.parameters.values, poses)
     with np.errstate(all="ignore"):  # steps may lead anywhere; what is no number is not taken
         if robust:
-            state, weights = _robustly(problem, state, steps)
+            state, weights = _robustly(problem, state, steps, enough)
         else:
             weights = _asked(problem, counted)
-            state = _minimise(problem, state, lambda _: weights, steps)
+            state = _minimise(problem, state, lambda _: weights, steps, enough)
         return _solution(problem, state, weights)
 
 
@@ -131,6 +133,7 @@ def resect_all(
     counted: Sequence[Bools] | None = None,
     *,
     robust: bool = False,
+    steps: int = STEPS,
 ) -> tuple[tuple[Pose, ...], tuple[Floats, ...]]:
     """The best pose of each view in a known camera, and residuals (n, 2) of all points.
 
@@ -141,10 +144,10 @@ def resect_all(
     state = State.of(np.zeros(0), poses)
     with np.errstate(all="ignore"):
         if robust:
-            state = _graduated(problem, state)
+            state = _graduated(problem, state, steps)
         else:
             weights = _asked(problem, counted)
-            state = _minimise(problem, state, lambda _: weights, STEPS)
+            state = _minimise(problem, state, lambda _: weights, steps)
         residuals = problem.residuals(state)
     return state.poses, tuple(residuals[part] for part in problem.parts)
 
@@ -166,8 +169,8 @@ class BoardProblem:
 
     def turned(self, state: State) -> Floats:
         """The points (n, 3) by the rotations alone."""
-        turned = state.turns[self.view_of] @ self.points[:, :, None]
-        return np.asarray(turned[:, :, 0])
+        each = zip(self.parts, state.turns, strict=True)
+        return np.concatenate([self.points[part] @ turn.T for part, turn in each])
 
     def residuals(self, state: State) -> Floats:
         camera = self.parameters.camera_of(state.values)
@@ -212,16 +215,18 @@ def _graduated(problem: Problem, state: State, steps: int = STEPS) -> State:
     return state
 
 
-def _robustly(problem: Problem, state: State, steps: int = STEPS) -> tuple[State, Floats]:
-    return _cleaned(problem, _graduated(problem, state, steps), steps)
+def _robustly(
+    problem: Problem, state: State, steps: int = STEPS, enough: float = ENOUGH
+) -> tuple[State, Floats]:
+    return _cleaned(problem, _graduated(problem, state, steps), steps, enough)
 
 
-def _cleaned(problem: Problem, state: State, steps: int) -> tuple[State, Floats]:
+def _cleaned(problem: Problem, state: State, steps: int, enough: float) -> tuple[State, Floats]:
     """Plain least squares without the points that are too far off, until these stay the same."""
     weights = _inliers(problem, state, np.ones(problem.count))
     for _ in range(6):
         fixed = weights
-        state = _minimise(problem, state, lambda _, fixed=fixed: fixed, steps)  # type: ignore[misc]
+        state = _minimise(problem, state, lambda _: fixed, steps, enough)  # noqa: B023
         weights = _inliers(problem, state, fixed)
         if np.array_equal(weights, fixed):
             break

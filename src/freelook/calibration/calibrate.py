@@ -13,6 +13,7 @@ import numpy as np
 
 from ..camera import Camera
 from ..errors import CalibrationError, FreelookError
+from ..lens import Floats
 from .bundle import Solution, resect_all, solve
 from .candidates import AUTO, Candidate, Progress, check_model, chosen, tried
 from .doubts import check_enough, check_fit, doubts, typical_uncertainty
@@ -23,7 +24,7 @@ from .views import Pose, View, checked
 
 __all__ = ["Calibration", "Candidate", "Progress", "calibrate"]
 
-RACE_POINTS, RACE_STEPS = 40, 8  # of each view, to tell the guesses apart
+RACE_POINTS, RACE_STEPS, RACE_ENOUGH = 40, 8, 1e-3  # of each view, to tell the guesses apart
 STRAY = 0.5  # a view counts if so many of its points do
 POOR_VIEW = 2.0  # times the usual median distance
 BETTER_POSE = 0.9  # times the median distance: less is another pose, not the same
@@ -122,8 +123,9 @@ def _base(views: list[View], size: tuple[int, int], freedom: Freedom) -> Solutio
     refined = []
     for guess in first_guesses(views, size):
         try:
+            start = as_kannala_brandt(guess.camera)
             refined.append(
-                solve(as_kannala_brandt(guess.camera), guess.poses, few, freedom, steps=RACE_STEPS)
+                solve(start, guess.poses, few, freedom, steps=RACE_STEPS, enough=RACE_ENOUGH)
             )
         except FreelookError:
             continue
@@ -158,28 +160,33 @@ def _other_poses(solution: Solution, views: list[View]) -> tuple[list[Pose], boo
         camera = with_field(solution.camera, seen_angle(solution, views))
     except CalibrationError:
         return list(solution.poses), False
-    misses = np.array([float(np.median(np.linalg.norm(r, axis=1))) for r in solution.residuals])
-    poor = misses > POOR_VIEW * np.median(misses)
-    linear = [
-        (pose_of(camera, view) if ask else None) or pose
-        for pose, view, ask in zip(solution.poses, views, poor, strict=True)
+    now = _medians(solution.residuals)
+    poor = [i for i, miss in enumerate(now) if miss > POOR_VIEW * float(np.median(now))]
+    every = list(range(len(views)))
+    linear = list(solution.poses)
+    for i in poor:
+        linear[i] = pose_of(camera, views[i]) or linear[i]
+    tries: list[tuple[list[int], Sequence[Pose]]] = [
+        (every, solution.poses),
+        (every, [mirrored(p, v) for p, v in zip(solution.poses, views, strict=True)]),
+        (poor, linear),
+        (poor, [mirrored(p, v) for p, v in zip(linear, views, strict=True)]),
     ]
-    tries = [
-        solution.poses,
-        linear,
-        [mirrored(p, v) for p, v in zip(solution.poses, views, strict=True)],
-        [mirrored(p, v) for p, v in zip(linear, views, strict=True)],
-    ]
-    ends = [resect_all(solution.camera, poses, views, robust=True) for poses in tries]
-    best, new = [], False
-    for i in range(len(views)):
-        each = [float(np.median(np.linalg.norm(residuals[i], axis=1))) for _, residuals in ends]
-        winner = int(np.argmin(each))
-        if each[winner] > BETTER_POSE * each[0]:
-            winner = 0
-        best.append(ends[winner][0][i])
-        new |= winner != 0
+    best, least, new = list(solution.poses), np.full(len(views), np.inf), False
+    for number, (asked, starts) in enumerate(tries):
+        if not asked:
+            continue
+        from_there, some = [starts[i] for i in asked], [views[i] for i in asked]
+        poses, residuals = resect_all(solution.camera, from_there, some, robust=True)
+        for i, pose, miss in zip(asked, poses, _medians(residuals), strict=True):
+            if miss < BETTER_POSE * least[i]:
+                best[i], least[i] = pose, miss
+                new |= number > 0
     return best, new
+
+
+def _medians(residuals: Sequence[Floats]) -> list[float]:
+    return [float(np.median(np.linalg.norm(r, axis=1))) for r in residuals]
 
 
 def _without_strays(

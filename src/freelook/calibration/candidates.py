@@ -1,12 +1,12 @@
 """Lens models tried on the same points, and which of them is taken.
 
-Every candidate is solved robustly, by itself. Then one of them says which points count for all:
-the one nearest to most points (least median residual). Were each to drop its own, a poor model
-would look good by having dropped what it cannot explain. On these points every candidate is solved
-again by plain least squares and cross-validated (see `left_out`): the camera is solved without a
-fifth of the views at a time, those views only get their pose, and their residuals tell how the
-model does on pictures it has not seen. A model with more parameters fits better and predicts worse
-once it is too much.
+Every candidate is solved robustly, by itself (those plainly far off only roughly). Then one of them
+says which points count for all: the one nearest to most points (least median residual). Were each
+to drop its own, a poor model would look good by having dropped what it cannot explain. On these
+points every candidate is solved again by plain least squares and cross-validated (see `left_out`):
+the camera is solved without a fifth of the views at a time, those views only get their pose, and
+their residuals tell how the model does on pictures it has not seen. A model with more parameters
+fits better and predicts worse once it is too much.
 
 Taken is the model with the fewest parameters that predicts within 1 % of the best. Not within one
 standard error, as is often done: a lens model is wrong mostly at the rim, where few views reach,
@@ -30,7 +30,7 @@ from .field import MARGIN, angles, seen_angle
 from .left_out import cross_validate
 from .nearby import nearby
 from .parameters import HELD, Freedom, lens_names
-from .views import View
+from .views import Pose, View
 
 # Tried by `auto`, those with few parameters first; the others are for those who ask for them.
 AUTO = (
@@ -48,6 +48,8 @@ AUTO = (
 # A model with more parameters must predict at least this much better.
 WORTH_IT = 0.99
 OUT_OF_THE_RACE = 1.5  # times the best RMS: what fits so badly need not be tested further
+# Among others a model is given up, after some steps, at so many times the RMS of Kannala-Brandt.
+FAR_OFF, ROUGH_STEPS, ROUGH_ENOUGH = 3.0, 12, 1e-3
 OVERFIT = 1.3  # times the RMS on views left out
 BEYOND = np.radians(0.5)  # of a model's end: more than the first lens may be off there
 FEW_FOLDED = 0.02  # of the points that count
@@ -109,13 +111,13 @@ def tried(
     alone = []
     for model in models:
         progress(model)
-        alone.append(_alone(model, views, base, freedom, drop))
+        alone.append(_alone(model, views, base, freedom, drop, among=len(models)))
     able = [c.solution for c in alone if c.solution is not None]
     if not able:
         return alone
     counted = min(able, key=_median_px).inliers
     progress("the same points for all")
-    same = [_on_common_points(c, views, freedom, counted) for c in alone]
+    same = [_on_common_points(c, views, base, freedom, counted) for c in alone]
     progress("views left out")
     least = np.nanmin([c.rms_px for c in same] + [np.inf])
     return [
@@ -145,16 +147,44 @@ def chosen(candidates: Sequence[Candidate]) -> Candidate:
 
 
 def _alone(
-    model: str, views: Sequence[View], base: Solution, freedom: Freedom, drop: bool
+    model: str, views: Sequence[View], base: Solution, freedom: Freedom, drop: bool, among: int
 ) -> Candidate:
+    """`among` more than one, a model far off is not solved to the end."""
     try:
+        if model == "kannala_brandt" and drop:
+            return Candidate(model, solution=_without_folded(base, views, freedom))
         start = _start(model, base, seen_angle(base, views), freedom)
-        solution = solve(start, base.poses, views, freedom, robust=drop)
+        poses = base.poses
+        if drop and among > 1:
+            near = _roughly(start, poses, views, freedom, base.inliers)
+            if _is_far_off(near, base):
+                return Candidate(model, solution=near)
+            start, poses = near.camera, near.poses
+        solution = solve(start, poses, views, freedom, robust=drop)
         if drop:
             solution = _without_folded(solution, views, freedom)
         return Candidate(model, solution=solution)
     except FreelookError as error:
         return Candidate(model, why_not=str(error))
+
+
+def _roughly(
+    start: Camera, poses: Sequence[Pose], views: Sequence[View], freedom: Freedom, counted: Counted
+) -> Solution:
+    return solve(
+        start,
+        poses,
+        views,
+        freedom,
+        robust=False,
+        counted=counted,
+        steps=ROUGH_STEPS,
+        enough=ROUGH_ENOUGH,
+    )
+
+
+def _is_far_off(solution: Solution, base: Solution) -> bool:
+    return solution.rms_px > FAR_OFF * base.rms_px
 
 
 def _without_folded(solution: Solution, views: Sequence[View], freedom: Freedom) -> Solution:
@@ -174,13 +204,21 @@ def _without_folded(solution: Solution, views: Sequence[View], freedom: Freedom)
 
 
 def _on_common_points(
-    candidate: Candidate, views: Sequence[View], freedom: Freedom, counted: Counted
+    candidate: Candidate,
+    views: Sequence[View],
+    base: Solution,
+    freedom: Freedom,
+    counted: Counted,
 ) -> Candidate:
     before = candidate.solution
     if before is None:
         return candidate
     try:
-        solution = solve(before.camera, before.poses, views, freedom, robust=False, counted=counted)
+        camera, poses = before.camera, before.poses
+        if _is_far_off(before, base):
+            solution = _roughly(camera, poses, views, freedom, counted)
+        else:
+            solution = solve(camera, poses, views, freedom, robust=False, counted=counted)
         _check_growth(solution.camera.lens, seen_angle(solution, views))
     except FreelookError as error:
         return Candidate(candidate.model, why_not=str(error))
@@ -200,6 +238,9 @@ def _start(name: str, base: Solution, seen: float, freedom: Freedom) -> Camera:
     """A camera of the wanted model that is near the base solution where points were seen."""
     if name == "kannala_brandt":
         return base.camera
+    ends = getattr(MODELS[name], "hard_limit", None)  # some end where their parameters say
+    if isinstance(ends, float):
+        _check_reach(name, ends, seen)
     grows = min(growth_limit(base.camera.lens), seen + MARGIN)
     known = make_camera(
         base.camera.size,
@@ -219,14 +260,18 @@ def _start(name: str, base: Solution, seen: float, freedom: Freedom) -> Camera:
     except FreelookError:  # it may still be solved for, on the points
         f = float(base.camera.lens.radius(np.array([0.01]))[0] / 0.01)
         return replace(base.camera, lens=MODELS[name](f))  # type: ignore[call-arg]
-    if near.lens.hard_limit <= np.pi / 2 and seen > np.pi / 2 + BEYOND:
+    _check_reach(name, near.lens.hard_limit, seen)
+    if not freedom.center:
+        return replace(base.camera, lens=near.lens)
+    return replace(base.camera, lens=near.lens, center=near.center, stretch=near.stretch)
+
+
+def _check_reach(name: str, end: float, seen: float) -> None:
+    if end <= np.pi / 2 and seen > np.pi / 2 + BEYOND:
         raise CalibrationError(
             f"{name} lenses end at 90 degrees from the axis; points were seen at "
             f"{np.degrees(seen):.1f}"
         )
-    if not freedom.center:
-        return replace(base.camera, lens=near.lens)
-    return replace(base.camera, lens=near.lens, center=near.center, stretch=near.stretch)
 
 
 def _spline_like(lens: Lens, theta_max: float) -> RadialSpline:

@@ -48,13 +48,14 @@ class Guess:
 
 def first_guesses(views: Sequence[View], size: tuple[int, int]) -> list[Guess]:
     """The best few guesses, best first; what is best here may lose after refinement."""
-    few = _Few(views)
+    smooth = [smooth_part(view) for view in views]
+    few = _Few(smooth)
     scored: list[_Scored] = []
     for center, lenses in _candidates(few.pixels, size):
         errors = few.errors_px(lenses, center)
         scored += [(float(e), lens, center) for e, lens in zip(errors, lenses, strict=True)]
     scored.sort(key=lambda entry: entry[0])
-    return [_guess(lens, center, views, size, error) for error, lens, center in _varied(scored)]
+    return [_guess(lens, center, smooth, size, error) for error, lens, center in _varied(scored)]
 
 
 def as_kannala_brandt(camera: Camera) -> Camera:
@@ -161,7 +162,7 @@ class _Few:
     """Some points of some views, the same number of each, to try thousands of lenses on."""
 
     def __init__(self, views: Sequence[View]) -> None:
-        thinned = [_thinned(smooth_part(view)) for view in _spread(views)]
+        thinned = [_thinned(view) for view in _spread(views)]
         self.points = np.stack([view.points for view in thinned])  # (views, n, 3)
         self.pixels = np.stack([view.pixels for view in thinned])  # (views, n, 2)
         self.flat = np.stack([_flattened(points)[0] for points in self.points])
@@ -264,7 +265,7 @@ def _guess(
     error_px: float,
 ) -> Guess:
     poses = []
-    for view in map(smooth_part, views):
+    for view in views:
         offset = view.pixels - center
         theta = _angles(lens, np.hypot(offset[:, 0], offset[:, 1]))
         poses.append(_pose(view.points, _rays(theta, np.arctan2(offset[:, 1], offset[:, 0]))))

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..camera import Camera
-from ..lens import Floats, Lens, RadialSpline, image_point, radius_slope
+from ..lens import Floats, Lens, RadialSpline, radius_slope
 from .parameters import Parameters, difference_step, lens_values, with_lens_values
 
 if TYPE_CHECKING:
@@ -89,10 +89,11 @@ class _Polar:
 
 def _lands(lens: Lens, bent: bool, polar: _Polar) -> Floats:
     """(n, 2) pixels from the axis, before the stretch."""
+    place = _radius(lens, polar.theta)[:, None] * polar.outwards
     if bent:
         around = np.arctan2(polar.outwards[:, 1], polar.outwards[:, 0])
-        return image_point(lens, _within(lens, polar.theta), around)
-    return np.asarray(_radius(lens, polar.theta)[:, None] * polar.outwards)
+        place += lens.offset(_within(lens, polar.theta), around)  # type: ignore[attr-defined]
+    return np.asarray(place)
 
 
 def _lens_slopes(lens: Lens, bent: bool, polar: _Polar) -> list[Floats]:

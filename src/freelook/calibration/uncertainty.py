@@ -37,14 +37,25 @@ def projection_uncertainty(
     camera: Camera, solution: Solution, freedom: Freedom, pixels: Floats
 ) -> Uncertainty:
     """The uncertainty at the given pixels; `camera` is the solution's, with its field."""
-    rays = camera.ray(pixels)
-    seen = np.isfinite(rays[:, 2])
+    covariance = projection_covariance(camera, solution, freedom, pixels)
+    seen = np.isfinite(covariance[:, 0, 0])
     sigma = np.full(len(pixels), np.nan)
     if seen.any():
-        left = _after_turning(camera, freedom, rays[seen])
-        covariance = left @ solution.covariance @ left.transpose(0, 2, 1)
-        sigma[seen] = np.sqrt(np.maximum(np.linalg.eigvalsh(covariance)[:, -1], 0))
+        sigma[seen] = np.sqrt(np.maximum(np.linalg.eigvalsh(covariance[seen])[:, -1], 0))
     return Uncertainty(pixels, sigma)
+
+
+def projection_covariance(
+    camera: Camera, solution: Solution, freedom: Freedom, pixels: Floats
+) -> Floats:
+    """The same as covariances (n, 2, 2), pixels squared."""
+    rays = camera.ray(pixels)
+    seen = np.isfinite(rays[:, 2])
+    covariance = np.full((len(pixels), 2, 2), np.nan)
+    if seen.any():
+        left = _after_turning(camera, freedom, rays[seen])
+        covariance[seen] = left @ solution.covariance @ left.transpose(0, 2, 1)
+    return covariance
 
 
 def grid_of(size: tuple[int, int], columns: int) -> Floats:

@@ -7,6 +7,7 @@ installed is named as skipped.
   freelook bench render --threads 1      on one core
   freelook bench latency                 needs a browser; takes about a minute
   freelook bench calibrate --data FOLDER beside OpenCV and mrcal; mrcal takes minutes
+  freelook bench calibrate --trials 200  random lenses instead: does it ever fail?
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import argparse
 import json
 import os
 import sys
+from dataclasses import asdict
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -49,6 +51,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--quick",
         action="store_true",
         help="without cross-validation: five solutions less",
+    )
+    calibrate.add_argument(
+        "--trials",
+        type=int,
+        metavar="N",
+        help="instead: N random lenses of every round model, each measured by what is stated "
+        "about its uncertainty; about a second for each",
     )
     calibrate.add_argument("--json", action="store_true", help="print the figures as JSON")
     calibrate.set_defaults(bench=_calibrate)
@@ -106,6 +115,8 @@ def _figures(timing: Timing, ours: Timing) -> dict[str, Any]:
 
 
 def _calibrate(args: argparse.Namespace) -> int:
+    if args.trials is not None:
+        return _trials(args)
     from ..bench.calibrate import real_sets, run, simulated_sets
 
     sets = simulated_sets()
@@ -123,6 +134,34 @@ def _calibrate(args: argparse.Namespace) -> int:
         if not args.data:
             print("fish_1, ov_plane: skipped: --data FOLDER says where they are")
     return 0
+
+
+def _trials(args: argparse.Namespace) -> int:
+    """Exit status 1 if any failed."""
+    from ..bench.calibration_trials import MOST_SIGMAS, Summary, run
+    from ._bars import bar
+
+    if args.trials < 1:
+        raise FreelookError(f"--trials {args.trials}: at least 1")
+    with bar("calibrations", args.trials, "lenses", quiet=args.json) as advance:
+        trials = list(run(args.trials, progress=advance))
+    found = Summary.of(trials)
+    if args.json:
+        each = [{**asdict(t), "sigmas": t.sigmas if isfinite(t.sigmas) else None} for t in trials]
+        print(json.dumps({"summary": asdict(found), "trials": each}, indent=2))
+        return int(found.failed > 0)
+    for trial in trials:
+        if trial.failed:
+            print(
+                f"trial {trial.seed}, {trial.model}, {trial.field_deg:.0f} degrees: {trial.failed}"
+            )
+    print(
+        f"{found.trials} calibrations of random lenses: {found.failed} failed\n"
+        f"projection within {MOST_SIGMAS:.0f} of its stated standard deviations: {found.within}; "
+        f"the worst {found.worst:.2f}\n"
+        f"spread of all, in stated standard deviations: {found.spread:.2f}"
+    )
+    return int(found.failed > 0)
 
 
 def _calibration_figures(row: Row) -> dict[str, Any]:
