@@ -76,9 +76,10 @@ class Head:
         if self._thread is not None and self._thread is not threading.current_thread():
             self._thread.join(2.0)
 
-    def aim(self, now_ns: int) -> Aim:
+    def aim(self, now_ns: int, capture_ns: int | None = None) -> Aim:
+        """Where to look now, in a frame taken at `capture_ns` (None: the newest one known)."""
         with self._lock:
-            return self._gimbal.aim(now_ns)
+            return self._gimbal.aim(now_ns, capture_ns)
 
     def recentre(self, now_ns: int) -> None:
         with self._lock:
@@ -92,6 +93,10 @@ class Head:
         with self._lock:
             self._gimbal.disable(now_ns)
 
+    def eyes_front(self, now_ns: int) -> None:
+        with self._lock:
+            self._gimbal.eyes_front(now_ns)
+
     def status(self, now_ns: int) -> HeadStatus:
         with self._lock:
             aim = self._gimbal.aim(now_ns)
@@ -100,6 +105,8 @@ class Head:
         state = "failed" if self._failure else aim.state
         message = self._failure or self._explain(aim.state, age_ns)
         counters = dict(self._tracker.counters.values)
+        if self._gimbal.jumps:
+            counters["jumps"] = self._gimbal.jumps
         return HeadStatus(self.name, state, message, age_ns, rate_hz, counters)
 
     def _explain(self, state: str, age_ns: int | None) -> str:
@@ -107,6 +114,8 @@ class Head:
             return ""
         if state == "disabled":
             return "disabled: looking straight ahead"
+        if state == "front":
+            return "eyes front: looking straight ahead until enabled"
         if age_ns is None:
             return self._tracker.message
         doing = {"holding": "holding the view", "easing": "going to the centre"}.get(state)

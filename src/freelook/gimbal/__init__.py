@@ -11,7 +11,7 @@ from .settings import GimbalSettings, StabiliserSettings
 from .shaping import AxisShape, Shape, parse_shape
 from .stabiliser import BODY, MODES, Base, Stabiliser
 from .targets import Direction, Location, parse_target
-from .zoom import ZoomLimits, zoom_limits
+from .zoom import ZoomLimits, most_focal_px, zoom_limits
 
 __all__ = [
     "BODY",
@@ -30,6 +30,7 @@ __all__ = [
     "Stabiliser",
     "StabiliserSettings",
     "ZoomLimits",
+    "most_focal_px",
     "parse_shape",
     "parse_target",
     "soft_stop",

@@ -17,8 +17,7 @@ from ..camera import Camera
 from ..resolution import resolution_at
 from ..viewport import NARROWEST_DEG, WIDEST_DEG
 
-MOST_ENLARGED = 6.0
-FULL_SPEED_DEG = 90.0
+MOST_ENLARGED = 10.0
 
 
 @dataclass(frozen=True)
@@ -37,11 +36,16 @@ def zoom_limits(camera: Camera, width_px: float) -> ZoomLimits:
 
     Always within 10 and 150 degrees, and never narrower than wide.
     """
-    per_degree = float(resolution_at(camera, np.array([0.0, 0.0, 1.0])).mean)
-    focal_px = MOST_ENLARGED * per_degree * math.degrees(1.0)
-    narrowest = max(NARROWEST_DEG, math.degrees(2 * math.atan(width_px / 2 / focal_px)))
+    field_deg = math.degrees(2 * math.atan(width_px / 2 / most_focal_px(camera)))
+    narrowest = max(NARROWEST_DEG, field_deg)
     widest = max(NARROWEST_DEG, min(WIDEST_DEG, 2 * math.degrees(camera.theta_max)))
     return ZoomLimits(min(narrowest, widest), widest)
+
+
+def most_focal_px(camera: Camera) -> float:
+    """The focal length in view pixels at which a view enlarges the camera's as far as it may."""
+    per_degree = float(resolution_at(camera, np.array([0.0, 0.0, 1.0])).mean)
+    return MOST_ENLARGED * per_degree * math.degrees(1.0)
 
 
 def sensitivity(field_deg: float) -> float:

@@ -6,13 +6,16 @@ import json
 from collections.abc import Iterable
 from typing import Any
 
+from scipy.spatial.transform import Rotation
+
 from ..camera import Camera
-from ..gimbal import Aim
+from ..gimbal import BODY, Aim, Base, most_focal_px, zoom_limits
 from ..head import HeadStatus
 from ..ingest import IngestStatus
-from ..rotations import RDF_FROM_FRD, to_wxyz
+from ..rotations import FRD_FROM_RDF, RDF_FROM_FRD, to_wxyz
 from ..session import camera_from_head
 from ..types import Counters
+from ..vehicle import VehicleStatus
 
 LONGEST_MESSAGE = 1000
 NS_PER_MS = 1e6
@@ -39,30 +42,62 @@ def pong(time_ms: float, now_ns: int) -> str:
 
 
 def pose(tracker: str, aim: Aim, now_ns: int) -> str:
-    """Where a head looks, as head_from_view; (1, 0, 0, 0) is straight ahead."""
-    return text(
-        {
-            "type": "pose",
-            "tracker": tracker,
-            "q": to_wxyz(RDF_FROM_FRD * aim.body_from_view),
-            "state": aim.state,
-            "t": aim.pose_ns,
-            "sent": now_ns,
-        }
-    )
+    """Where a head looks, as head_from_view; (1, 0, 0, 0) is straight ahead.
+
+    A stabilised aim is told in parts, because the page knows better which frame it shows: the view
+    is left * base * q, with the base of that frame, and "left" what is left of an earlier aim.
+    """
+    message = {
+        "type": "pose",
+        "tracker": tracker,
+        "q": to_wxyz(RDF_FROM_FRD * aim.body_from_view),
+        "state": aim.state,
+        "t": aim.pose_ns,
+        "sent": now_ns,
+    }
+    if aim.stabilised and aim.base.turned:
+        message["q"] = to_wxyz(RDF_FROM_FRD * aim.head)
+        message["left"] = _in_head_axes(aim.leftover)
+        message["based"] = True
+    return text(message)
 
 
-def frame(rtp: int, capture_ns: int) -> str:
-    return text({"type": "frame", "rtp": rtp, "arrival": capture_ns})
+def frame(rtp: int, capture_ns: int, base: Base = BODY) -> str:
+    """When a frame came, and the base in which heads turn while it is shown; none in body mode."""
+    message: dict[str, Any] = {"type": "frame", "rtp": rtp, "arrival": capture_ns}
+    if base.turned:
+        message["base"] = _in_head_axes(base.body_from_base)
+    return text(message)
 
 
-def status(source: dict[str, Any], trackers: Iterable[HeadStatus], viewers: int) -> dict[str, Any]:
-    return {
+def _in_head_axes(body_rotation: Rotation) -> list[float]:
+    """A rotation of the body, in the axes of a head that looks straight ahead."""
+    turned = RDF_FROM_FRD * body_rotation * FRD_FROM_RDF
+    return [round(value, 7) for value in to_wxyz(turned)]
+
+
+def status(
+    source: dict[str, Any],
+    trackers: Iterable[HeadStatus],
+    viewers: int,
+    vehicle: VehicleStatus | None = None,
+) -> dict[str, Any]:
+    message: dict[str, Any] = {
         "type": "status",
         "source": source,
         "trackers": [_tracker(tracker) for tracker in trackers],
         "viewers": viewers,
     }
+    if vehicle is not None:
+        message["vehicle"] = {
+            "mode": vehicle.mode,
+            "effective": vehicle.effective,
+            "state": vehicle.state,
+            "message": vehicle.message,
+            "received": vehicle.received,
+            "counters": vehicle.counters,
+        }
+    return message
 
 
 def source_status(
@@ -101,6 +136,17 @@ def _offsets(camera: Camera) -> dict[str, Any] | None:
         "p_max": camera.grid.p_max,
         "size": len(camera.grid.offsets),
         "values": [round(float(value), 5) for value in camera.grid.offsets.ravel()],
+    }
+
+
+def zoom(camera: Camera) -> dict[str, float]:
+    """The fields that make sense: between these degrees, and no narrower than that a view's focal
+    length, in its own pixels, is this."""
+    limits = zoom_limits(camera, width_px=2)
+    return {
+        "narrowest_deg": limits.narrowest_deg,
+        "widest_deg": limits.widest_deg,
+        "focal_px": most_focal_px(camera),
     }
 
 

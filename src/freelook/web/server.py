@@ -9,6 +9,7 @@ from pathlib import Path
 
 from aiohttp import web
 
+from ..errors import TrackerError
 from .security import Guard
 from .station import ACTIONS, Station, UnknownName
 from .whep import Refused
@@ -40,6 +41,7 @@ def make_app(station: Station, guard: Guard) -> web.Application:
     app.cleanup_ctx.append(_running_station)
     app.router.add_get("/api/station", _about)
     app.router.add_post("/api/control", _control)
+    app.router.add_post("/api/mode", _mode)
     app.router.add_post("/whep", _whep_post)
     app.router.add_options("/whep", _whep_options)
     app.router.add_delete("/whep/{session}", _whep_delete)
@@ -137,6 +139,17 @@ async def _control(request: web.Request) -> web.StreamResponse:
     except UnknownName as error:
         unknown = web.HTTPNotFound if action in ACTIONS else web.HTTPBadRequest
         raise unknown(text=f"{error}\n") from None
+    return web.Response(status=204)
+
+
+async def _mode(request: web.Request) -> web.StreamResponse:
+    (mode,) = await read_strings(request, "mode")
+    try:
+        request.app[STATION].set_mode(mode)
+    except UnknownName as error:
+        raise web.HTTPBadRequest(text=f"{error}\n") from None
+    except TrackerError as error:
+        raise web.HTTPConflict(text=f"{error}\n") from None
     return web.Response(status=204)
 
 

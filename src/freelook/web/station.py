@@ -15,10 +15,11 @@ from typing import Any
 from .. import __version__
 from ..camera import Camera
 from ..clock import Clock, now_ns
-from ..gimbal import Aim
+from ..gimbal import MODES, Aim, GimbalSettings, Stabiliser
 from ..head import Head
 from ..ingest import Ingest
 from ..session import same_shape
+from ..vehicle import Vehicle
 from . import messages
 from .feed import Feed
 from .units import Hub
@@ -26,7 +27,7 @@ from .whep import Viewer, Viewers
 
 TICK_S = 1 / 30
 TICKS_PER_STATUS = 7
-ACTIONS = ("recentre", "enable", "disable")
+ACTIONS = ("recentre", "enable", "disable", "eyes_front")
 
 
 @dataclass(frozen=True)
@@ -38,10 +39,11 @@ class About:
     hold_s: float = 1.0
     ease_s: float = 2.0
     hfov_deg: float = 90.0
+    limit: str = "black"
 
 
 class UnknownName(LookupError):  # noqa: N818 - an answer, not a failure
-    """A tracker or an action that does not exist; says which do."""
+    """A tracker, an action or a mode that does not exist; says which do."""
 
 
 class Station:
@@ -54,6 +56,7 @@ class Station:
         heads: Mapping[str, Head],
         about: About,
         *,
+        vehicle: Vehicle | None = None,
         most_viewers: int = 16,
         clock: Clock = now_ns,
     ) -> None:
@@ -62,6 +65,7 @@ class Station:
         self._camera = camera
         self._heads = dict(heads)
         self._about = about
+        self._vehicle = Vehicle(Stabiliser()) if vehicle is None else vehicle
         self._most_viewers = most_viewers
         self._clock = clock
         self._pose_pending = dict.fromkeys(self._heads, False)
@@ -78,6 +82,7 @@ class Station:
         )
         self._ingest.start()
         self._feed.start()
+        self._vehicle.start()
         for name, head in self._heads.items():
             head.start(partial(self._pose_arrived, name))
         self._ticker = asyncio.create_task(self._tick())
@@ -86,6 +91,7 @@ class Station:
         self._ticker.cancel()
         await self.viewers.close()
         self._feed.close()
+        await asyncio.to_thread(self._vehicle.close)
         for head in self._heads.values():
             await asyncio.to_thread(head.close)
         await asyncio.to_thread(self._ingest.close)
@@ -101,10 +107,14 @@ class Station:
             "hold_s": self._about.hold_s,
             "ease_s": self._about.ease_s,
             "hfov_deg": self._about.hfov_deg,
+            "limit": self._about.limit,
+            "modes": list(MODES),
+            "rate_deg_s": GimbalSettings().rate_deg_s,
+            "zoom": messages.zoom(self._camera),
         }
 
     def control(self, tracker: str, action: str) -> None:
-        """Recentre, enable or disable a tracker; UnknownName lists what there is."""
+        """One of ACTIONS, to a tracker; UnknownName lists what there is."""
         if action not in ACTIONS:
             raise UnknownName(f"unknown action {action!r}; known: {', '.join(ACTIONS)}")
         if tracker not in self._heads:
@@ -112,6 +122,14 @@ class Station:
             raise UnknownName(f"unknown tracker {tracker!r}; known: {known}")
         getattr(self._heads[tracker], action)(self._clock())
         self._push_pose(tracker)
+
+    def set_mode(self, mode: str) -> None:
+        """Of everybody's view, as in `freelook.gimbal.MODES`. UnknownName for another one,
+        TrackerError for *point* without anything to point at."""
+        if mode not in MODES:
+            raise UnknownName(f"unknown mode {mode!r}; known: {', '.join(MODES)}")
+        self._vehicle.stabiliser.set_mode(mode)
+        self._send_all(messages.text(self.status()))
 
     def status(self) -> dict[str, Any]:
         """The message of the 4 Hz status, as data."""
@@ -126,7 +144,7 @@ class Station:
         )
         source = messages.source_status(ingest, self._feed.why, trouble, counters)
         trackers = [head.status(now) for head in self._heads.values()]
-        return messages.status(source, trackers, len(self.viewers))
+        return messages.status(source, trackers, len(self.viewers), self._vehicle.status())
 
     # --- what viewers tell us
 
@@ -143,7 +161,8 @@ class Station:
             viewer.send(messages.pong(time_ms, self._clock()))
 
     def frame_sent(self, viewer: Viewer, rtp: int, capture_ns: int) -> None:
-        viewer.send(messages.frame(rtp, capture_ns))
+        base = self._vehicle.stabiliser.at(self._clock(), capture_ns)
+        viewer.send(messages.frame(rtp, capture_ns, base))
 
     def wants_key(self, viewer: Viewer) -> bool:
         return self._feed.request_key()
