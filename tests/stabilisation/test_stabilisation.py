@@ -12,7 +12,7 @@ from freelook.errors import AttitudeError
 from freelook.lens import Equidistant
 from freelook.rotations import FRD_FROM_RDF, angle_between_deg, body_from_view
 from freelook.stabilisation.containment import Containment, eased, widest_hfov_deg
-from freelook.stabilisation.modes import MODES, STEP_NS, Flight, StabilisedAim
+from freelook.stabilisation.smooth_aim import STEP_NS, Flight, SmoothAim
 from freelook.stabilisation.smoothing import smoothed
 from freelook.viewport import Viewport
 
@@ -39,7 +39,7 @@ def fisheye(field_deg: float = 200.0) -> Camera:
     return make_camera((200, 200), Equidistant(200 / np.radians(field_deg)), field_deg=field_deg)
 
 
-def views_of(aim: StabilisedAim, count: int) -> Rotation:
+def views_of(aim: SmoothAim, count: int) -> Rotation:
     return Rotation.concatenate([aim(k * STEP_NS) for k in range(count)])
 
 
@@ -139,30 +139,7 @@ def test_an_eased_curve_is_smooth_and_nowhere_higher(rng: np.random.Generator) -
     assert eased(np.ones(5), 0).tolist() == [1.0] * 5
 
 
-# --- the modes
-
-
-def test_horizon_is_level_and_turns_with_the_heading() -> None:
-    angles = np.stack([20 * TIMES_S, 15 * np.sin(TIMES_S), 30 * np.sin(1.7 * TIMES_S)], axis=-1)
-    track = track_of_euler(angles)
-    aim = StabilisedAim("horizon", Flight(track, 10**9, 30), lambda _: body_from_view(25, -10))
-    for k in range(0, 800, 37):
-        t_ns = k * STEP_NS
-        seen = track.at(np.array([t_ns + 10**9]))[0] * aim(t_ns)
-        heading = 20 * (t_ns / 1e9 + 1)
-        expected = Rotation.from_euler("Z", heading, degrees=True) * body_from_view(25, -10)
-        # between two attitudes, 10 ms apart, the path is an arc
-        assert angle_between_deg(seen, expected) < 0.02
-
-
-def test_world_keeps_the_heading_of_the_first_frame() -> None:
-    angles = np.stack([30 + 20 * TIMES_S, 0 * TIMES_S, 20 * np.sin(TIMES_S)], axis=-1)
-    track = track_of_euler(angles)
-    aim = StabilisedAim("world", Flight(track, 2 * 10**9, 30), ahead)
-    expected = Rotation.from_euler("Z", 70, degrees=True) * body_from_view(0, 0)
-    for k in range(0, 800, 37):
-        seen = track.at(np.array([k * STEP_NS + 2 * 10**9]))[0] * aim(k * STEP_NS)
-        assert angle_between_deg(seen, expected) < 0.02
+# --- the aim
 
 
 def test_smooth_takes_out_what_is_quick_and_nothing_else() -> None:
@@ -170,9 +147,7 @@ def test_smooth_takes_out_what_is_quick_and_nothing_else() -> None:
     angles[:, 0] = 5 * TIMES_S
     angles[:, 2] = 10 * np.sin(2 * np.pi * 3 * TIMES_S)
     track = track_of_euler(angles)
-    aim = StabilisedAim("smooth", Flight(track, 5 * 10**9, 25), ahead)
-    aim.smooth(0.5)
-    aim.contain(fisheye(), VIEW)
+    aim = SmoothAim(Flight(track, 5 * 10**9, 25), ahead, fisheye(), VIEW, 0.5)
     assert aim.limited == 0.0
     for k in range(0, 700, 31):
         seen = track.at(np.array([k * STEP_NS + 5 * 10**9]))[0] * aim(k * STEP_NS)
@@ -187,12 +162,12 @@ def test_smooth_never_shows_what_the_lens_does_not_see() -> None:
     angles = np.zeros((len(TIMES_S), 3))
     angles[:, 0] = 70 * np.sin(2 * np.pi * 0.4 * TIMES_S) * (TIMES_S > 15)
     track, camera = track_of_euler(angles), fisheye(180)
-    aim = StabilisedAim("smooth", Flight(track, 0, 28), ahead)
-    aim.smooth(0.05)
-    assert not Containment(camera, VIEW).holds(views_of(aim, 800)).all()
-    aim.contain(camera, VIEW)
+    flight, containment = Flight(track, 0, 28), Containment(camera, VIEW)
+    boundless = SmoothAim(flight, ahead, fisheye(280), VIEW, 0.05)
+    assert not containment.holds(views_of(boundless, 800)).all()
+    aim = SmoothAim(flight, ahead, camera, VIEW, 0.05)
     views = views_of(aim, 800)
-    assert Containment(camera, VIEW).holds(views).all()
+    assert containment.holds(views).all()
     assert 0.3 < aim.limited < 0.8
     quiet = views[30:100]  # long before the first swing nothing is drawn back
     assert angle_between_deg(quiet[0], quiet[-1]) < 0.01
@@ -202,19 +177,18 @@ def test_smooth_never_shows_what_the_lens_does_not_see() -> None:
 
 
 def test_a_view_that_never_fits_is_refused_with_one_that_does() -> None:
-    aim = StabilisedAim("smooth", Flight(rolling(5, 1), 0, 30), ahead)
+    flight = Flight(rolling(5, 1), 0, 30)
     with pytest.raises(AttitudeError, match=r"try --hfov 10[0-9]"):
-        aim.contain(fisheye(120), Viewport((64, 48), 140))
-    away = StabilisedAim("smooth", Flight(rolling(5, 1), 0, 30), lambda _: body_from_view(150, 0))
+        SmoothAim(flight, ahead, fisheye(120), Viewport((64, 48), 140))
     with pytest.raises(AttitudeError, match="look elsewhere"):
-        away.contain(fisheye(120), VIEW)
+        SmoothAim(flight, lambda _: body_from_view(150, 0), fisheye(120), VIEW)
 
 
 def test_where_the_attitude_is_unknown_the_view_is_the_vehicle_s() -> None:
     track = rolling(20, 0.5)
     kept = (track.times_ns < 10**10) | (track.times_ns > 2 * 10**10)
     holed = AttitudeTrack(track.times_ns[kept], track.world_from_body[kept])
-    aim = StabilisedAim("horizon", Flight(holed, -5 * 10**9, 40), ahead)
+    aim = SmoothAim(Flight(holed, -5 * 10**9, 40), ahead, fisheye(), VIEW, 0.1)
     views = views_of(aim, 1200)
     raw = np.degrees((views.inv() * body_from_view(0, 0)).magnitude())
     assert raw[:149].max() == 0  # before the log begins
@@ -226,10 +200,6 @@ def test_where_the_attitude_is_unknown_the_view_is_the_vehicle_s() -> None:
 
 
 def test_a_log_of_another_time_is_refused() -> None:
-    with pytest.raises(AttitudeError, match=r"begins -100\.0 s into it"):
-        StabilisedAim("world", Flight(rolling(1, 1), -100 * 10**9, 20), ahead)
-
-
-def test_unknown_modes_are_refused_with_those_known() -> None:
-    with pytest.raises(AttitudeError, match=", ".join(MODES)):
-        StabilisedAim("level", Flight(rolling(1, 1), 0, 20), ahead)
+    flight = Flight(rolling(1, 1), -100 * 10**9, 20)
+    with pytest.raises(AttitudeError, match=r"begins at -100\.000 s of it"):
+        SmoothAim(flight, ahead, fisheye(), VIEW)

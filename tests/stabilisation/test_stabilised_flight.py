@@ -16,11 +16,12 @@ from scipy.spatial.transform import Rotation
 
 from freelook.alignment.image_turns import ImageTurn, ImageTurns
 from freelook.alignment.time_offset import find_offset
+from freelook.attitude import AttitudeBuffer
 from freelook.attitude_track import AttitudeTrack
+from freelook.gimbal import Stabiliser
 from freelook.renderers.cpu import CpuRenderer
 from freelook.rotations import body_from_view
-from freelook.stabilisation.modes import Flight, StabilisedAim
-from freelook.types import Frame, Picture
+from freelook.types import Attitude, Frame, Picture
 from freelook.viewport import Viewport
 from logged_flight import FRAME_NS, px4_attitude, simulated, small_fisheye
 
@@ -64,13 +65,20 @@ def rms(values: NDArray[np.float64]) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def aims(shared_data: Path, mode: str, delay_ns: int) -> Rotation:
-    """Where `mode` looks for every frame when the video is taken to be late by `delay_ns`."""
-    track = px4_attitude(shared_data)
-    zero_ns = recording(shared_data)[0].capture_ns - delay_ns
-    flight = Flight(track, zero_ns, FRAMES * FRAME_NS / 1e9)
-    aim = StabilisedAim(mode, flight, lambda _: body_from_view(0, 0))
-    return Rotation.concatenate([aim(k * FRAME_NS) for k in range(FRAMES)])
+def horizon_views(shared_data: Path, track: AttitudeTrack, offset_ns: int) -> Rotation:
+    """Where the gimbal's mode *horizon* looks for every frame, with the track as its attitude."""
+    stabiliser = Stabiliser(buffer=AttitudeBuffer(span_s=1e6))
+    stabiliser.set_offset(offset_ns)
+    stabiliser.set_mode("horizon")
+    last_ns = recording(shared_data)[-1].capture_ns + 10**9
+    for index, t_ns in enumerate(track.times_ns[track.times_ns < last_ns].tolist()):
+        stabiliser.push(Attitude(t_ns, track.world_from_body[index]))
+    looks = []
+    for frame in recording(shared_data):
+        base = stabiliser.at(frame.capture_ns, frame.capture_ns)
+        assert base.state == "steady"
+        looks.append(base.body_from_base * body_from_view(0, 0))
+    return Rotation.concatenate(looks)
 
 
 def test_turns_seen_are_those_that_were_flown(shared_data: Path) -> None:
@@ -96,8 +104,8 @@ def test_the_horizon_stays_level_with_the_attitude_at_capture(shared_data: Path)
     track = px4_attitude(shared_data)
     captured = np.array([f.capture_ns for f in recording(shared_data)]) - DELAY_NS
     found = find_offset(turns(shared_data), track)
-    kept = tilts_deg(track, captured, aims(shared_data, "horizon", -found.offset_ns))
-    newest = tilts_deg(track, captured, aims(shared_data, "horizon", 0))
+    kept = tilts_deg(track, captured, horizon_views(shared_data, track, found.offset_ns))
+    newest = tilts_deg(track, captured, horizon_views(shared_data, track, 0))
     raw = tilts_deg(track, captured, Rotation.concatenate([body_from_view(0, 0)] * FRAMES))
     assert rms(kept) < 0.3
     # the vehicle turns by 50 degrees a second rms: in 120 ms that is degrees, not tenths
@@ -113,9 +121,7 @@ def test_a_telemetry_link_s_rate_is_enough(shared_data: Path) -> None:
     captured = np.array([f.capture_ns for f in recording(shared_data)]) - DELAY_NS
     offset_ns = find_offset(turns(shared_data), sparse).offset_ns
     assert abs(offset_ns + DELAY_NS) < 5_000_000
-    flight = Flight(sparse, int(captured[0]) + DELAY_NS + offset_ns, FRAMES * FRAME_NS / 1e9)
-    aim = StabilisedAim("horizon", flight, lambda _: body_from_view(0, 0))
-    views = Rotation.concatenate([aim(k * FRAME_NS) for k in range(FRAMES)])
+    views = horizon_views(shared_data, sparse, offset_ns)
     # what lies between two attitudes is guessed: measured 0.13
     assert rms(tilts_deg(whole, captured, views)) < 0.3
 
@@ -157,10 +163,11 @@ def gray_of(picture: Picture) -> NDArray[np.uint8]:
 
 
 def test_the_horizon_stays_level_in_the_pictures(shared_data: Path) -> None:
-    offset_ns = find_offset(turns(shared_data), px4_attitude(shared_data)).offset_ns
+    track = px4_attitude(shared_data)
+    offset_ns = find_offset(turns(shared_data), track).offset_ns
     chosen = list(range(45, FRAMES, 10))
-    kept = in_pictures_deg(shared_data, aims(shared_data, "horizon", -offset_ns), chosen)
-    newest = in_pictures_deg(shared_data, aims(shared_data, "horizon", 0), chosen)
+    kept = in_pictures_deg(shared_data, horizon_views(shared_data, track, offset_ns), chosen)
+    newest = in_pictures_deg(shared_data, horizon_views(shared_data, track, 0), chosen)
     # the pictures themselves are worth a tenth of a pixel, 0.08 degrees
     assert rms(kept) < 0.3
     assert rms(newest) > 1.5

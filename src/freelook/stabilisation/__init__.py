@@ -1,5 +1,5 @@
-"""The vehicle's motion taken out of recordings, with a record of its attitude.
+"""A recording's quick motions taken out, with a record of the vehicle's attitude.
 
-`modes` makes the aim, `smoothing` the low-passed path, `containment` keeps a view in the lens.
-While flying it is `freelook.gimbal` that does so, which cannot look ahead.
+`smooth_aim` is where the view looks, `smoothing` the low-passed path, `containment` keeps views in
+the lens. What needs no look ahead (level horizon, fixed heading) is `freelook.gimbal`'s.
 """
