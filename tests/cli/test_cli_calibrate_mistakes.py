@@ -113,6 +113,19 @@ def test_blurred_pictures_are_told_from_empty_ones(
     assert "with a light margin?" in line
 
 
+def test_a_blurred_picture_is_told_even_if_the_board_is_found(
+    shots: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    picture = BOARD.picture(Held((220, 150), 0.16, (20, -20), 20))
+    soft = written(
+        tmp_path / "soft.png", np.asarray(cv2.GaussianBlur(picture, (0, 0), 4.5), np.uint8)
+    )
+    assert main(["calibrate", *shots[:3], soft, "--model", "equidistant"]) == 0
+    said = capsys.readouterr().err
+    assert f"{soft} is blurred; its corners may be off" in said
+    assert said.count("is blurred;") == 1
+
+
 def test_what_counts_as_blurred() -> None:
     """By the width of its steepest edges, in a picture of 1280 pixels; noise is no edge."""
     rng = np.random.default_rng(5)

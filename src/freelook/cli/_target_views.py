@@ -24,7 +24,7 @@ class Found:
 
     pictures  of the views, by name: gray; for reports
     without   names of pictures without the target
-    blurred   those of them that are blurred
+    blurred   names of pictures that are blurred, with the target or without
     size      of all pictures
     """
 
@@ -37,10 +37,10 @@ class Found:
     def add(self, name: str, gray: Gray, view: View | None) -> None:
         size = (gray.shape[1], gray.shape[0])
         self.of_size(name, size)
+        if is_blurred(gray):
+            self.blurred.append(name)
         if view is None:
             self.without.append(name)
-            if is_blurred(gray):
-                self.blurred.append(name)
         else:
             self.views.append(view)
             self.pictures[name] = gray

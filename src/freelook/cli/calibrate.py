@@ -112,7 +112,7 @@ def _run(args: argparse.Namespace, target: Target) -> int:
 def _nothing_found(found: Found, target: Target) -> str:
     shown = ", ".join(found.without[:5]) + (" ..." if len(found.without) > 5 else "")
     why = "is it wholly or mostly in the picture, sharp, flat, evenly lit, with a light margin?"
-    if found.blurred:
+    if found.blurred:  # and without, as all of them are
         why = f"{len(found.blurred)} of them are blurred: focus, hold the board still, more light"
     elif target.named:
         why += " Are its numbers and its markers as on the print?"
@@ -132,6 +132,8 @@ def _print(calibration: Calibration, found: Found) -> None:
     for name in found.without:
         blurred = "; the picture is blurred" if name in found.blurred else ""
         print(f"{name}: target not found{blurred}", file=sys.stderr)
+    for name in sorted({*found.blurred} - {*found.without}):
+        print(f"{name} is blurred; its corners may be off: better leave it out", file=sys.stderr)
     console = Console()
     solution = calibration.solution
     views = Table(title="views")
