@@ -210,7 +210,7 @@ def test_lag_of_a_pure_delay_is_the_delay(delay_ms: float) -> None:
 
 
 def test_turns_are_late_by_the_delay_at_every_level() -> None:
-    duel = fight(synthetic_head(3), settings())
+    duel = fight(synthetic_head(4), settings())
     t_ns = np.arange(0, duel.turns.duration_ns, 1_000_000, dtype=np.int64)
     late = Shown(t_ns, duel.turns.at(t_ns - 80_000_000), t_ns)
     delays = measure.turn_delays_ms(duel.turns, late)
@@ -244,7 +244,7 @@ def test_the_share_of_time_beyond_a_lens() -> None:
 
 
 def test_a_head_that_is_too_short_is_refused() -> None:
-    with pytest.raises(TrackerError, match=r"lasts 1\.5 s; a duel needs two seconds"):
+    with pytest.raises(TrackerError, match=r"lasts 1\.5 s; a duel needs four seconds"):
         fight(synthetic_head(1.5), settings())
 
 

@@ -89,8 +89,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--video",
         action="store_true",
-        help="also both pilots' views side by side, over the simulated world (needs --out; "
-        f"the first {VIDEO_SECONDS:.0f} s, or --seconds)",
+        help="also both pilots' views side by side, over the simulated world (needs --out)",
+    )
+    parser.add_argument(
+        "--video-seconds",
+        type=positive,
+        default=VIDEO_SECONDS,
+        metavar="S",
+        help=f"how long the video is at most (default: {VIDEO_SECONDS:.0f})",
     )
     parser.add_argument(
         "--lens", default="demo", metavar="PROFILE", help="freelook's fisheye (default: demo)"
@@ -262,9 +268,7 @@ def _film(args: argparse.Namespace, duel: Duel) -> None:
     labels = ("freelook", f"gimbal: {args.gimbal}, {args.link} link")
     threads = os.cpu_count() or 1
     views = SideBySide(duel, load_camera(args.lens), Viewport((640, 480), 90), labels, threads)
-    times = times_ns(duel, VIDEO_FPS)
-    if not args.seconds:
-        times = times[: round(VIDEO_SECONDS * VIDEO_FPS)]
+    times = times_ns(duel, VIDEO_FPS)[: max(1, round(args.video_seconds * VIDEO_FPS))]
     sink = open_sink(str(path), size=views.size, fps=VIDEO_FPS, overwrite=args.overwrite)
     with contextlib.closing(sink), bar(path.name, len(times), "frames") as advance:
         for t_ns in times:

@@ -19,7 +19,7 @@ from .predictors import Predictor
 
 Floats = NDArray[np.float64]
 MakePredictor = Callable[[], Predictor] | None
-LEAST_NS = 2 * NS_PER_S
+LEAST_NS = 4 * NS_PER_S
 
 
 @dataclass(frozen=True)
@@ -87,11 +87,12 @@ def fight(
 ) -> Duel:
     """Drive both sides and measure. The makers give a new predictor each time they are called.
 
-    TrackerError for a head that moves for less than two seconds.
+    TrackerError for a head that is watched for less than four seconds.
     """
     if head.duration_ns < LEAST_NS:
         raise TrackerError(
-            f"{head.name} lasts {head.duration_ns / NS_PER_S:g} s; a duel needs two seconds or more"
+            f"{head.name} lasts {head.duration_ns / NS_PER_S:g} s; "
+            "a duel needs four seconds or more"
         )
     turns = turns_head()
     shown, motors = _both(head, settings, freelook_predictor, gimbal_predictor, advance)

@@ -21,7 +21,7 @@ Times = NDArray[np.int64]
 HEADER = ("timestamp", "viewpoint", "w", "x", "y", "z")
 LEAST_STEP_NS = 1_000_000
 SYNTHETIC_SECONDS = 60.0
-TURNS = 24
+TURNS = 12
 
 # recordings: x forward, y left, z up, for the head and for the room
 _FRD_FROM_FLU = Rotation.from_quat([1.0, 0.0, 0.0, 0.0])
