@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 import argparse
+from typing import TYPE_CHECKING
 
 from ..attitude import AttitudeBuffer
 from ..clock import NS_PER_S
 from ..errors import AttitudeError
-from ..gimbal import LIMITS, MODES, Stabiliser, parse_target
+from ..gimbal import LIMITS, MODES, GimbalSettings, Stabiliser, parse_shape, parse_target
+from ..prediction import PREDICTORS
+from ..types import AccessUnit
+from ..vehicle import Vehicle
+
+if TYPE_CHECKING:  # slow to load, and may be missing
+    from ..attitudes._log import LogSource
+    from ..ingest import Ingest
 
 WHOLE_LOG_S = 1e9
 
@@ -46,6 +54,48 @@ def add_mode_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_head_arguments(parser: argparse.ArgumentParser) -> None:
+    """What is made of a tracker's angles, at the station."""
+    parser.add_argument(
+        "--gain",
+        default="",
+        metavar="K",
+        help="the view turns K times as far as the head: 2, or yaw=2,pitch=1.5",
+    )
+    parser.add_argument(
+        "--dead-zone",
+        default="",
+        metavar="DEG",
+        help="the head may turn so far before the view does: 3, or yaw=3,roll=90",
+    )
+    parser.add_argument(
+        "--invert", default="", metavar="AXES", help="the other way round: pitch, or pitch,roll"
+    )
+    parser.add_argument(
+        "--predictor",
+        choices=tuple(PREDICTORS),
+        default="hold",
+        help="how the head is expected to go on (default hold: not at all)",
+    )
+    parser.add_argument(
+        "--ahead",
+        type=float,
+        default=0.0,
+        metavar="MS",
+        help="expect it for so long after now: the way from here to the eye, 0 to 500",
+    )
+
+
+def gimbal_settings(args: argparse.Namespace) -> GimbalSettings:
+    """From `add_head_arguments` and --hold and --ease."""
+    return GimbalSettings(
+        hold_s=args.hold,
+        ease_s=args.ease,
+        ahead_s=args.ahead / 1000,
+        shape=parse_shape(args.gain, args.dead_zone, args.invert),
+    )
+
+
 def check_mode(args: argparse.Namespace) -> None:
     """AttitudeError for a mode that can never work."""
     if args.mode != "body" and args.attitude is None:
@@ -62,9 +112,30 @@ def stabiliser_for(args: argparse.Namespace, buffer: AttitudeBuffer | None = Non
     return stabiliser
 
 
+def vehicle_for(args: argparse.Namespace, ingest: Ingest) -> Vehicle:
+    """For flying: a live source is read as it comes. A log is known from the beginning, and
+    belongs to a recording: its times are told from the recording's own."""
+    from ..attitudes import open_attitude
+    from ..attitudes._log import LogSource
+
+    source = None if args.attitude is None else open_attitude(args.attitude)
+    if not isinstance(source, LogSource):
+        return Vehicle(stabiliser_for(args), source)
+    stabiliser = stabiliser_for(args, AttitudeBuffer(span_s=WHOLE_LOG_S))
+    _push_log(stabiliser, source)
+    offset_ns = stabiliser.offset_ns
+
+    def follow_recording(unit: AccessUnit) -> None:
+        if unit.key and unit.media_ns is not None:
+            stabiliser.set_offset(offset_ns + unit.media_ns - unit.capture_ns)
+
+    ingest.subscribe(follow_recording)
+    return Vehicle(stabiliser, source)
+
+
 def stabiliser_from_log(args: argparse.Namespace) -> Stabiliser:
-    """Knowing the whole log; AttitudeError when it cannot be read or has none at the start of the
-    video."""
+    """For a recording: knowing the whole log. AttitudeError when it cannot be read or says nothing
+    about the start of the video."""
     from ..attitudes import open_attitude
     from ..attitudes._log import LogSource
 
@@ -82,6 +153,10 @@ def stabiliser_from_log(args: argparse.Namespace) -> Stabiliser:
             f"{stabiliser.offset_ns / NS_PER_S:.3f} s of it; give --attitude-offset: the log's "
             "time at the first picture"
         )
+    _push_log(stabiliser, source)
+    return stabiliser
+
+
+def _push_log(stabiliser: Stabiliser, source: LogSource) -> None:
     for attitude in source.attitudes():
         stabiliser.push(attitude)
-    return stabiliser

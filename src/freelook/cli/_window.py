@@ -7,14 +7,15 @@ import contextlib
 import signal
 import threading
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import TYPE_CHECKING
 
 from ..camera import Camera
 from ..clock import now_ns
-from ..gimbal import GimbalSettings
 from ._arguments import size
 from ._progress import StatusLine, say
 from ._renderers import add_sampling_argument
+from ._stabilising import vehicle_for
 
 if TYPE_CHECKING:
     from ..ingest import Ingest
@@ -73,23 +74,26 @@ def fly_in_window(args: argparse.Namespace, ingest: Ingest, camera: Camera) -> N
     from ..window.flight import Flight, Outside
     from ..window.pilot import Pilot
     from ..window.surface import Surface
-    from .fly import open_heads
+    from .fly import gimbal_for, open_heads
 
     optics = Optics(args.eyes, args.eye_offset, args.viewer_lens)
-    settings = GimbalSettings(hold_s=args.hold, ease_s=args.ease)
+    vehicle = vehicle_for(args, ingest)
     with contextlib.ExitStack() as opened:
         surface = opened.enter_context(Surface(args.window_size, args.monitor, not args.no_vsync))
         say(f"window: drawn by {surface.renderer}")
         say(KEYS)
-        heads = open_heads(args.tracker, settings, opened)
+        gimbal = partial(gimbal_for, args, vehicle.stabiliser)
+        heads = open_heads(args.tracker, gimbal, opened)
+        opened.callback(vehicle.close)
         opened.callback(ingest.close)
         frames = ingest.frames()
         ingest.start()
+        vehicle.start()
         for head in heads.values():
             head.start()
         line = opened.enter_context(StatusLine())
         outside = Outside(now_ns, opened.enter_context(asked_to_stop()), _report(ingest, line))
-        pilot = Pilot(heads, args.hfov)
+        pilot = Pilot(heads, args.hfov, vehicle.stabiliser)
         flight = Flight(surface, frames, camera, pilot, outside, optics, args.sampling)
         opened.callback(lambda: say(summary(flight.figures)))
         flight.run()

@@ -43,7 +43,7 @@ def run(args: argparse.Namespace) -> int:
 
     args.tracker = args.tracker or [HEAD]
     address = f"rtp://127.0.0.1:{free_port()}"
-    about = About("simulated flight", True, args.hold, args.ease, args.hfov)
+    about = About("simulated flight", True, args.hold, args.ease, args.hfov, args.limit)
     started_s = time.monotonic()
     fly(
         args,

@@ -17,17 +17,25 @@ import contextlib
 import threading
 import webbrowser
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..camera import Camera
-from ..gimbal import Gimbal, GimbalSettings
+from ..gimbal import Gimbal, GimbalSettings, Stabiliser
 from ..head import Head
+from ..prediction import make_predictor
 from ..trackers import known_trackers, open_tracker
 from ..viewport import Viewport
 from ._cameras import add_lens_arguments, mounted_camera
 from ._circles import camera_by_circle
 from ._progress import StatusLine, say
+from ._stabilising import (
+    add_head_arguments,
+    add_mode_arguments,
+    gimbal_settings,
+    vehicle_for,
+)
 from ._window import add_window_arguments, fly_in_window
 
 if TYPE_CHECKING:  # the web libraries are slow to load, and may be missing
@@ -77,6 +85,8 @@ def add_flying_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--hfov", type=float, default=90.0, metavar="DEG", help="horizontal field of view at start"
     )
+    add_head_arguments(parser)
+    add_mode_arguments(parser)
     add_serving_arguments(parser)
 
 
@@ -125,7 +135,7 @@ def run(args: argparse.Namespace) -> int:
         return 0
     from ..web.station import About
 
-    about = About(args.source, False, args.hold, args.ease, args.hfov)
+    about = About(args.source, False, args.hold, args.ease, args.hfov, args.limit)
     fly(args, ingest, camera, about, never)
     return 0
 
@@ -147,11 +157,12 @@ def fly(
     from ..web.station import Station
 
     Viewport((16, 9), about.hfov_deg)  # says what is wrong with it
-    settings = GimbalSettings(hold_s=about.hold_s, ease_s=about.ease_s)
+    vehicle = vehicle_for(args, ingest)
     with contextlib.ExitStack() as opened, StatusLine() as line:
-        heads = open_heads(args.tracker, settings, opened)
+        gimbal = partial(gimbal_for, args, vehicle.stabiliser)
+        heads = open_heads(args.tracker, gimbal, opened)
         door = opened.enter_context(opened_door(args))
-        station = Station(ingest, camera, heads, about)
+        station = Station(ingest, camera, heads, about, vehicle=vehicle)
         serving = serve(
             make_app(station, door.guard),
             door,
@@ -179,14 +190,19 @@ def opened_door(args: argparse.Namespace) -> Iterator[Door]:
         yield door
 
 
+def gimbal_for(args: argparse.Namespace, stabiliser: Stabiliser | None = None) -> Gimbal:
+    """A new one, as the arguments say."""
+    return Gimbal(gimbal_settings(args), make_predictor(args.predictor), stabiliser)
+
+
 def open_heads(
-    specs: Sequence[str], settings: GimbalSettings, opened: contextlib.ExitStack
+    specs: Sequence[str], gimbal: Callable[[], Gimbal], opened: contextlib.ExitStack
 ) -> dict[str, Head]:
     """Heads by name: the tracker's kind, numbered from the second of a kind on."""
     heads: dict[str, Head] = {}
     for spec in specs:
         name = _free_name(spec.partition(":")[0].partition("?")[0], heads)
-        heads[name] = Head(name, open_tracker(spec), Gimbal(settings))
+        heads[name] = Head(name, open_tracker(spec), gimbal())
         opened.callback(heads[name].close)
     return heads
 

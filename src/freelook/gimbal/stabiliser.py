@@ -90,6 +90,7 @@ class Stabiliser:
         self._fixed_deg: float | None = None
         self._choice = 0  # counts choices of a mode; a new one is a change even to the same mode
         self._jumps: list[tuple[int, int]] = []
+        self._framed = False  # whether anybody ever told a frame's capture
         # of the last question
         self._asked: tuple[int, int] | None = None
         self._kind: tuple[bool, int] | None = None
@@ -161,14 +162,16 @@ class Stabiliser:
     # --- what is asked
 
     def at(self, now_ns: int, capture_ns: int | None = None) -> Base:
-        """The base for a frame taken at `capture_ns` (None: the last frame asked about, or now),
-        shown now."""
+        """The base for a frame taken at `capture_ns`, shown now. None: that of the last frame asked
+        about, or where nobody ever knew one, now."""
         with self._lock:
-            last_now_ns, last_capture_ns = self._asked or (now_ns, now_ns)
+            last_now_ns, last_capture_ns = self._asked or (now_ns, LONG_AGO_NS)
             if capture_ns is None:
-                capture_ns = last_capture_ns if self._asked else now_ns
+                capture_ns = last_capture_ns if self._framed else max(now_ns, last_capture_ns)
+            else:
+                self._framed = True
             now_ns = max(now_ns, last_now_ns)
-            if capture_ns < last_capture_ns and self._asked:
+            if capture_ns < last_capture_ns:
                 return self._glance(now_ns, capture_ns)
             if self._asked != (now_ns, capture_ns):
                 self._newest = self._answer(now_ns, capture_ns)

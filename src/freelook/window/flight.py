@@ -118,7 +118,7 @@ class Flight:
         self._handle(self._surface.events())
         latched_ns = self._outside.clock()
         self._pilot.advance(latched_ns, self._surface.pad())
-        look = self._pilot.look(latched_ns)
+        look = self._pilot.look(latched_ns, frame.capture_ns)
         hfov_deg = self._pilot.hfov_deg
         shown = (id(frame), size, hfov_deg, grey, tuple(look.body_from_view.as_quat()))
         if shown == self._shown:

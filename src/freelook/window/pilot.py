@@ -13,6 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..clock import NS_PER_S
+from ..gimbal import Stabiliser
 from ..head import Head
 from ..rotations import body_from_view, head_angles_deg
 from ..viewport import NARROWEST_DEG, WIDEST_DEG, Viewport
@@ -39,10 +40,14 @@ class Look:
 
 
 class Pilot:
-    """`heads` are trackers by name; the first has control at the beginning."""
+    """`heads` are trackers by name; the first has control at the beginning. `stabiliser` is what
+    their gimbals use; the hand turns in its base too."""
 
-    def __init__(self, heads: Mapping[str, Head], hfov_deg: float) -> None:
+    def __init__(
+        self, heads: Mapping[str, Head], hfov_deg: float, stabiliser: Stabiliser | None = None
+    ) -> None:
         self.hfov_deg = hfov_deg
+        self._stabiliser = Stabiliser() if stabiliser is None else stabiliser
         self._heads = dict(heads)
         self._tracker = next(iter(self._heads), None)
         self._by_hand = self._tracker is None
@@ -53,13 +58,17 @@ class Pilot:
         self._pad_held: frozenset[str] = frozenset()
         self._stepped_ns: int | None = None
 
-    def look(self, now_ns: int) -> Look:
+    def look(self, now_ns: int, capture_ns: int | None = None) -> Look:
+        """Now, in a frame taken at `capture_ns` (None: the newest one known)."""
         head = self._head
         if head is not None:
-            aim = head.aim(now_ns)
+            aim = head.aim(now_ns, capture_ns)
             return Look(aim.body_from_view, aim.pose_ns)
-        angles = (self._yaw_deg, self._pitch_deg) if self._enabled else (0.0, 0.0)
-        return Look(body_from_view(*angles), self._hand_ns)
+        base = self._stabiliser.at(now_ns, capture_ns)
+        if not self._enabled:
+            return Look(body_from_view(0.0, 0.0), self._hand_ns)
+        hand = body_from_view(self._yaw_deg, self._pitch_deg)
+        return Look(base.body_from_base * hand, self._hand_ns)
 
     def take(self, events: Iterable[Event], now_ns: int, size: tuple[int, int]) -> list[str]:
         """Turn, zoom, recentre; returns what is for others to do: "full screen", "quit".
@@ -168,7 +177,9 @@ class Pilot:
     def _take_over(self, now_ns: int) -> None:
         """By hand from where the tracker looks, upright."""
         if not self._by_hand:
-            self._yaw_deg, self._pitch_deg, _ = head_angles_deg(self.look(now_ns).body_from_view)
+            base = self._stabiliser.newest.body_from_base
+            looked = base.inv() * self.look(now_ns).body_from_view
+            self._yaw_deg, self._pitch_deg, _ = head_angles_deg(looked)
             self._by_hand = True
 
 
