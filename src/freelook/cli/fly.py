@@ -156,7 +156,8 @@ def fly(
     from ..web.serving import serve
     from ..web.station import Station
 
-    Viewport((16, 9), about.hfov_deg)  # says what is wrong with it
+    Viewport((16, 9), about.hfov_deg)  # these two say what is wrong with them
+    gimbal_settings(args)
     vehicle = vehicle_for(args, ingest)
     with contextlib.ExitStack() as opened, StatusLine() as line:
         gimbal = partial(gimbal_for, args, vehicle.stabiliser)
