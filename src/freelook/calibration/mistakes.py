@@ -11,8 +11,12 @@ import numpy as np
 
 from ..camera import Camera
 from ..errors import CalibrationError
+from . import aprilgrid
+from ._markers import find_markers
+from .aprilgrid import AprilGrid
 from .bundle import resect
 from .calibrate import Calibration
+from .charuco import Charuco
 from .initial import pose_of
 from .targets import Chessboard, Circles, Gray, Target
 from .views import FEWEST_POINTS, View, checked
@@ -22,6 +26,7 @@ FINE_PX, COARSE_PX = 1.0, 4.0
 BLURRED = 1.5  # a step blurred by s is sqrt((4^2 + s^2) / (1^2 + s^2)) as steep at the fine scale
 FAINT = 1.0  # grey levels per pixel
 TRIED = 3  # pictures in which a larger board is looked for
+FEW_MARKERS = 4  # so few may be misread
 FITS, MISFITS = 3.0, 10.0  # times the usual distance
 
 
@@ -80,6 +85,24 @@ def other_size(target: Target, views: Sequence[View], pictures: Mapping[str, Gra
     if np.prod(seen) <= np.prod(said) or count < 2:
         return ""
     return _told(size, f"{count} of {len(names)} pictures looked at again show", seen)
+
+
+def why_not_by_markers(target: Target, pictures: Mapping[str, Gray]) -> str:
+    """A sentence about pictures in which a target with markers was not found; "" for others."""
+    if isinstance(target, Charuco):
+        kind, border, most = target.dictionary, 1, int(np.prod(target.squares)) // 2
+    elif isinstance(target, AprilGrid):
+        kind, border, most = aprilgrid.FAMILY, aprilgrid.BORDERS[0], int(np.prod(target.tags))
+    else:
+        return ""
+    seen = {name: len(find_markers(g, kind, most, border)[0]) for name, g in pictures.items()}
+    name = max(seen, key=lambda name: seen[name], default="")
+    if not name or seen[name] < FEW_MARKERS:
+        return f"hardly a marker of {kind} was read in them: is that what is printed?"
+    return (
+        f"{seen[name]} markers of {kind} were read in {name}, but not enough where this target has "
+        "them: are its numbers across and down right?"
+    )
 
 
 def _told(size: tuple[int, int], what: str, seen: tuple[int, int]) -> str:

@@ -15,6 +15,7 @@ from ._bars import bar
 
 MOST_FRAMES = 300  # of a video that are searched
 MOST_VIEWS = 40  # of a video that are kept
+MOST_MISSED = 3  # pictures without the target that are kept
 STILL_PX = 1.0  # between two frames that follow each other
 
 
@@ -24,6 +25,7 @@ class Found:
 
     pictures  of the views, by name: gray; for reports
     without   names of pictures without the target
+    missed    the first few of these, by name
     blurred   names of pictures that are blurred, with the target or without
     size      of all pictures
     """
@@ -31,6 +33,7 @@ class Found:
     views: list[View] = field(default_factory=list)
     pictures: dict[str, Gray] = field(default_factory=dict)
     without: list[str] = field(default_factory=list)
+    missed: dict[str, Gray] = field(default_factory=dict)
     blurred: list[str] = field(default_factory=list)
     size: tuple[int, int] | None = None
 
@@ -41,6 +44,8 @@ class Found:
             self.blurred.append(name)
         if view is None:
             self.without.append(name)
+            if len(self.missed) < MOST_MISSED:
+                self.missed[name] = gray
         else:
             self.views.append(view)
             self.pictures[name] = gray

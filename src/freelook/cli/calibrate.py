@@ -110,12 +110,14 @@ def _run(args: argparse.Namespace, target: Target) -> int:
 
 
 def _nothing_found(found: Found, target: Target) -> str:
+    from ..calibration.mistakes import why_not_by_markers
+
     shown = ", ".join(found.without[:5]) + (" ..." if len(found.without) > 5 else "")
     why = "is it wholly or mostly in the picture, sharp, flat, evenly lit, with a light margin?"
     if found.blurred:  # and without, as all of them are
         why = f"{len(found.blurred)} of them are blurred: focus, hold the board still, more light"
     elif target.named:
-        why += " Are its numbers and its markers as on the print?"
+        why = why_not_by_markers(target, found.missed) or why
     return (
         f"the target ({target.text}) was found in none of {len(found.without)} inputs ({shown}); "
         f"{why}"
