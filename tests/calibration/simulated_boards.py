@@ -18,6 +18,7 @@ from freelook.lens import Equidistant, Floats
 Gray = NDArray[np.uint8]
 Pictures = NDArray[np.float32]
 
+TURNS = np.arange(16) * np.pi / 8
 BEHIND = 0.35  # reflectance of what is behind a target
 # Places in a pixel that are looked at: a Fibonacci lattice, in which no two lie in one row or
 # column, so that an edge moves in steps of 1/21 pixel.
@@ -138,12 +139,14 @@ class Studio:
         """Pixels (n, 2) of target points (n, 3), wherever they are; NaN beyond the field."""
         return self.camera.project(pose.apply(points))
 
-    def inside(self, pixels: Floats, margin: float = 0.0) -> NDArray[np.bool_]:
-        """Which pixels (n, 2) are in the picture, that far from its edge."""
-        within = np.isfinite(pixels).all(axis=1)
-        pixels = np.where(within[:, None], pixels, -1.0)
+    def inside(self, pixels: Floats, margin: float) -> NDArray[np.bool_]:
+        """Which pixels (n, 2) are in the picture, that far from its edge and the field's."""
+        around = margin * np.stack([np.cos(TURNS), np.sin(TURNS)], axis=-1)
+        places = np.round(np.nan_to_num(pixels, nan=-1e6)[:, None] + around).astype(int)
         last = np.array(self.camera.size) - 1
-        return np.asarray(((pixels >= margin) & (pixels <= last - margin)).all(axis=1))
+        within = ((places >= 0) & (places <= last)).all(axis=-1)
+        x, y = np.moveaxis(np.clip(places, 0, last), -1, 0)
+        return np.asarray((within & self._lit[y, x]).all(axis=1))
 
     def photograph(
         self,
@@ -214,4 +217,4 @@ def _mean(texture: Pictures, corners: Floats) -> Pictures:
         shares = (1 - u) * (1 - v), u * (1 - v), (1 - u) * v, u * v
         at = sum(np.float32(share) * part for share, part in zip(shares, quarters, strict=True))
         total += cv2.remap(texture, at, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return total / len(SAMPLES)
+    return np.asarray(total / len(SAMPLES), np.float32)

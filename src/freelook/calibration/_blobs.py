@@ -7,6 +7,7 @@ neighbours are found without knowing the grid, and from then on it grows as a ch
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import cv2
@@ -20,7 +21,7 @@ from ._saddles import Gray
 
 WINDOWS = (8, 16, 40)  # parts of the picture's shorter side that brightness is compared over
 LEAST = 6  # grey levels beyond the usual of the surroundings
-SMALLEST_PX2 = 12.0  # area of a blob
+SMALLEST_PX2 = 20.0  # area of a blob; a smaller one looks round whatever it is
 LARGEST_SHARE = 0.02  # of the picture
 ROUND = 0.03  # how far an area may be from that of the ellipse of these moments; squares: 0.045
 LONGEST = 6.0  # axis of an ellipse, in short ones
@@ -48,8 +49,9 @@ class Blobs:
         return np.asarray(4 * np.pi * np.sqrt(np.linalg.det(self.spread)))
 
 
-def find_blobs(gray: Gray) -> Blobs:
-    """Dark ellipses on light ground, each once."""
+def find_blobs(gray: Gray, scale: float = 1.0) -> Blobs:
+    """Dark ellipses on light ground, each once; in a picture enlarged `scale` times."""
+    smallest, largest = SMALLEST_PX2 * scale**2, LARGEST_SHARE * gray.size
     pixels, spread = [], []
     for part in WINDOWS:
         window = max(7, min(gray.shape) // part) | 1
@@ -58,29 +60,31 @@ def find_blobs(gray: Gray) -> Blobs:
         )
         outlines, _ = cv2.findContours(dark, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
         for outline in outlines:
-            ellipse = _ellipse(outline, LARGEST_SHARE * gray.size)
+            ellipse = _ellipse(outline, smallest, largest)
             if ellipse is not None:
                 pixels.append(ellipse[0])
                 spread.append(ellipse[1])
     return _each_once(np.array(pixels).reshape(-1, 2), np.array(spread).reshape(-1, 2, 2))
 
 
-def _ellipse(outline: Cells, largest: float) -> tuple[Floats, Floats] | None:
+def _ellipse(outline: Cells, smallest: float, largest: float) -> tuple[Floats, Floats] | None:
     """Middle and second moments of what an outline encloses, if that is an ellipse."""
     if len(outline) < 8:
         return None
     m = cv2.moments(outline)
     # an outline runs through the middles of the outermost pixels: half a pixel is missing around it
     area = m["m00"] + len(outline) / 2
-    if not SMALLEST_PX2 <= area <= largest or m["m00"] <= 0:
+    if not smallest <= area <= largest or m["m00"] <= 0:
         return None
-    spread = np.array([[m["mu20"], m["mu11"]], [m["mu11"], m["mu02"]]]) / m["m00"]
-    short, long = np.sqrt(np.maximum(np.linalg.eigvalsh(spread), 0))
-    inner = 4 * np.pi * short * long
-    if short < 0.3 or long > LONGEST * short or abs(m["m00"] / inner - 1) > ROUND:
+    xx, xy, yy = (m[name] / m["m00"] for name in ("mu20", "mu11", "mu02"))
+    half, apart = (xx + yy) / 2, math.hypot((xx - yy) / 2, xy)
+    short, long = math.sqrt(max(half - apart, 0.0)), math.sqrt(half + apart)
+    if short < 0.3 or long > LONGEST * short:
+        return None
+    if abs(m["m00"] / (4 * math.pi * short * long) - 1) > ROUND:
         return None
     middle = np.array([m["m10"], m["m01"]]) / m["m00"]
-    return middle, spread * (area / m["m00"])
+    return middle, np.array([[xx, xy], [xy, yy]]) * (area / m["m00"])
 
 
 def _each_once(pixels: Floats, spread: Floats) -> Blobs:

@@ -6,10 +6,10 @@ import numpy as np
 
 from ..lens import Floats
 from ._blobs import LEAST, Blobs
-from ._lattice import Cells, Lattice
+from ._lattice import Bools, Cells, Lattice
 from ._saddles import Gray
 
-CROWDED = 0.1  # of what is around a blob may be dark
+CROWDED = 0.02  # of what is around a blob may be dark
 HALO = 1.7  # radii around a blob that its middle is weighed from
 REACH = 3  # cells on each side that say how the grid bends
 WIDE = 1.2  # cells: how fast they count for less with their distance
@@ -45,12 +45,23 @@ def _weighed(gray: Gray, at: Floats, spread: Floats) -> tuple[Floats, float] | N
     if inner.sum() < 1 or outer.sum() < 4:
         return None
     light, dark = float(np.median(patch[outer])), float(np.median(patch[inner]))
-    darkness = (light - patch) / max(light - dark, 1e-9)
-    if light - dark < LEAST or (darkness[outer] > 0.5).mean() > CROWDED:
+    if light - dark < LEAST:
         return None
+    around = outer & (patch > (light + dark) / 2)
+    if around.sum() < (1 - CROWDED) * outer.sum():
+        return None
+    paper = _plane(offset, patch, around)  # lenses and lamps light no paper evenly
+    darkness = (paper - patch) / np.maximum(paper * (1 - dark / light), 1e-9)
     weight = np.clip(darkness, 0, 1) * (far < HALO)
     area = float(weight.sum())
     return np.array([np.sum(weight * x), np.sum(weight * y)]) / area, area
+
+
+def _plane(offset: Floats, patch: Floats, chosen: Bools) -> Floats:
+    """The plane through the chosen pixels' values, at all pixels."""
+    terms = np.concatenate([np.ones_like(offset[..., :1]), offset], axis=-1)
+    normal = terms[chosen].T @ terms[chosen] + np.diag([0, 1e-6, 1e-6])
+    return np.asarray(terms @ np.linalg.solve(normal, terms[chosen].T @ patch[chosen]))
 
 
 def centres(blobs: Blobs, lattice: Lattice) -> Floats:

@@ -19,6 +19,7 @@ from ..errors import CalibrationError
 from ..lens import Floats
 from ._lattice import SAME_PX, Bools, LocalMaps, in_squares, maps_at
 from ._saddles import Gray, Slopes, Window, likeness, placed
+from .views import FEWEST_POINTS
 
 STRAY = 0.5  # of a square: how far a marker may be from where the others expect it
 ENOUGH = 0.6  # of the markers: the corners between them are found without the others
@@ -26,11 +27,18 @@ DOUBLED = 2_000_000  # pixels: pictures up to that are looked at enlarged too, o
 LIKE = 0.65  # correlation with the ideal corner; which corner it is, markers say
 REACHES = 0.5, 1.1  # pitches from what is known, that corners are looked for at
 RINGS_REACH = 0.34  # of what `likeness` looks at
-DICTIONARIES = {
-    name.removeprefix("DICT_").lower(): getattr(cv2.aruco, name)
-    for name in dir(cv2.aruco)
-    if name.startswith("DICT_")
-}
+WORSE, WORSE_TIMES = 0.08, 5.0  # how much less like a corner than the median one may be
+CONFIRMED = 0.2  # of the markers among the corners found must be read and where they belong
+OFF = 0.25  # of a square or tag: how far a marker may be from there
+
+
+def _dictionaries() -> dict[str, int]:
+    names = [name for name in dir(cv2.aruco) if name.startswith("DICT_")]
+    known = {name.removeprefix("DICT_").lower(): int(getattr(cv2.aruco, name)) for name in names}
+    return dict(sorted(known.items(), key=lambda item: item[1]))
+
+
+DICTIONARIES = _dictionaries()
 
 
 @dataclass(frozen=True)
@@ -114,7 +122,25 @@ def find_corners(
         found = np.flatnonzero(np.isfinite(search.at[:, 0]))
         points = np.concatenate([markers[good].reshape(-1, 2), plan.corners[found]])
         pixels = np.concatenate([seen[good].reshape(-1, 2), search.at[found]])
-    return _once_more(search.slopes, plan, _each_once(search.at))
+    found, at = _once_more(search.slopes, plan, _each_once(search.at))
+    if not _confirmed(plan, found, at, markers.mean(axis=1), seen.mean(axis=1)):
+        return found[:0], at[:0]
+    return found, at
+
+
+def _confirmed(
+    plan: Plan, found: NDArray[np.int64], at: Floats, markers: Floats, seen: Floats
+) -> bool:
+    """Whether the markers' middles say that the corners are those of the plan.
+
+    Of another board, some markers are misread as this one's.
+    """
+    if len(found) < FEWEST_POINTS or not len(markers):
+        return False
+    maps = maps_at(markers, plan.corners[found], at)
+    right = maps.known & (in_squares(maps.axes, seen - maps.place) < OFF)
+    expected = len(plan.markers) / len(plan.corners) * len(found)
+    return bool(right.sum() > max(1, CONFIRMED * expected, (maps.known & ~right).sum()))
 
 
 class _Search:
@@ -157,23 +183,39 @@ def _placed(slopes: Slopes, plan: Plan, which: NDArray[np.int64], maps: LocalMap
     at, good = placed(slopes, maps.place, maps, plan.window)
     good &= in_squares(maps.axes, at - maps.place) < plan.search
     here = LocalMaps(np.where(good[:, None], at, maps.place), maps.axes, maps.bend, maps.known)
-    alike, _ = likeness(slopes.level, here, 0.9 * plan.clear / RINGS_REACH)
-    good &= plan.signs[which] * alike > LIKE
+    good &= _alike(slopes, plan, which, here) > LIKE
     return np.where(good[:, None], at, np.nan)
 
 
+def _alike(slopes: Slopes, plan: Plan, which: NDArray[np.int64], maps: LocalMaps) -> Floats:
+    alike, _ = likeness(slopes.level, maps, 0.9 * plan.clear / RINGS_REACH)
+    return np.asarray(plan.signs[which] * alike)
+
+
 def _once_more(slopes: Slopes, plan: Plan, at: Floats) -> tuple[NDArray[np.int64], Floats]:
-    """Placed again by windows that follow the corners themselves, not the markers' rough ones."""
+    """Placed again by windows that follow the corners themselves, not the markers' rough ones.
+
+    Without those that look worse than the others: the rim of the lens's picture is near, a finger.
+    """
     found = np.flatnonzero(np.isfinite(at[:, 0]))
     if not len(found):
         return found, np.empty((0, 2))
     maps = maps_at(plan.corners[found], plan.corners[found], at[found])
     found = found[maps.known & (in_squares(maps.axes, at[found] - maps.place) < plan.search)]
+    found, maps = _known(plan, found, at)
+    at = at.copy()
+    at[found] = _placed(slopes, plan, found, maps)
+    found, maps = _known(plan, found[np.isfinite(at[found, 0])], at)
+    unlike = 1 - _alike(slopes, plan, found, maps)
+    good = unlike < WORSE + WORSE_TIMES * np.median(unlike) if len(found) else np.zeros(0, bool)
+    return found[good], at[found[good]]
+
+
+def _known(plan: Plan, found: NDArray[np.int64], at: Floats) -> tuple[NDArray[np.int64], LocalMaps]:
+    """The corners around which there are enough others, and the maps there."""
     maps = maps_at(plan.corners[found], plan.corners[found], at[found], own=True)
     maps = LocalMaps(at[found], maps.axes, maps.bend, maps.known)
-    fine = _placed(slopes, plan, found[maps.known], maps.part(maps.known))
-    good = np.isfinite(fine[:, 0])
-    return found[maps.known][good], fine[good]
+    return found[maps.known], maps.part(maps.known)
 
 
 def _without_strays(points: Floats, pixels: Floats) -> Bools:

@@ -150,10 +150,10 @@ def _found(gray: Gray, *, lone: bool) -> Lattice | None:
     asymmetric ones.
     """
     for picture in (gray, 255 - gray):
-        lattice = _grid(picture, lone=lone)
+        lattice = _grid(picture, 1.0, lone=lone)
         if gray.size <= DOUBLED and (lattice is None or _step_px(lattice) < SMALL_PX):
             enlarged = cv2.resize(picture, None, fx=2, fy=2, interpolation=cv2.INTER_LINEAR)
-            finer = _grid(enlarged, lone=lone)
+            finer = _grid(enlarged, 2.0, lone=lone)
             if finer is not None and (lattice is None or len(finer) > len(lattice)):
                 cells = finer.cells()
                 lattice = Lattice.of(cells, (finer.pixels(cells) + 0.5) / 2 - 0.5)
@@ -167,8 +167,8 @@ def _step_px(lattice: Lattice) -> float:
     return float(lattice.maps(lattice.cells(), own=True).shortest_step().min())
 
 
-def _grid(gray: Gray, *, lone: bool) -> Lattice | None:
-    blobs = weighed(gray, find_blobs(gray))
+def _grid(gray: Gray, scale: float, *, lone: bool) -> Lattice | None:
+    blobs = weighed(gray, find_blobs(gray, scale))
     lattice = grid_of(blobs)
     if lattice is None:
         return None
