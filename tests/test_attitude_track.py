@@ -44,6 +44,20 @@ def test_before_and_after_a_track_its_ends_are_held(rng: np.random.Generator) ->
     assert angle_between_deg(found[1], track.world_from_body[-1]) < 1e-6
 
 
+def test_a_part_answers_for_its_time_as_the_whole_does(rng: np.random.Generator) -> None:
+    track = wandering(rng, 30)
+    for start, end in ((5, 12), (0, 29), (20, 20), (-3, 2), (28, 40)):
+        low = int(track.start_ns + start * 3 * 10**8)
+        high = int(track.start_ns + end * 3 * 10**8)
+        asked = np.linspace(low, high, 50).astype(np.int64)
+        part = track.part(low, high)
+        assert np.array_equal(part.known(asked), track.known(asked))
+        apart = (part.at(asked).inv() * track.at(asked)).magnitude()
+        assert np.degrees(apart[track.known(asked)].max(initial=0.0)) < 1e-6
+    assert len(track.part(0, 1).times_ns) == 2
+    assert len(track.part(10**18, 10**18 + 1).times_ns) == 2
+
+
 def test_rates_lead_from_each_attitude_to_the_next(rng: np.random.Generator) -> None:
     track = wandering(rng, 20)
     middles, rates = track.rates()

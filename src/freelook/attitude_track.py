@@ -42,6 +42,14 @@ class AttitudeTrack:
     def duration_s(self) -> float:
         return float(self.times_ns[-1] - self.times_ns[0]) / NS_PER_S
 
+    def part(self, start_ns: int, end_ns: int) -> AttitudeTrack:
+        """What is needed to answer for times from start to end, two attitudes at least."""
+        first = int(np.searchsorted(self.times_ns, start_ns, "right")) - 1
+        last = int(np.searchsorted(self.times_ns, end_ns, "left")) + 1
+        first = min(max(first, 0), len(self.times_ns) - 2)
+        last = max(last, first + 2)
+        return AttitudeTrack(self.times_ns[first:last], self.world_from_body[first:last])
+
     def known(self, times_ns: Times, longest_gap_s: float = LONGEST_GAP_S) -> NDArray[np.bool_]:
         """Whether there is an attitude at each time: within the record and not inside a gap."""
         after = self._after(times_ns)

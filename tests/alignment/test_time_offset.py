@@ -100,11 +100,11 @@ def test_too_little_is_refused_with_the_reason(rng: np.random.Generator) -> None
         find_offset(seen_turns(track, 3, 5, 10**12, rng), track, (0, 10**9))
 
 
-def test_the_result_reads_as_a_sentence(rng: np.random.Generator) -> None:
+def test_the_evidence_is_told_in_words(rng: np.random.Generator) -> None:
     track = tumbling(rng, 20)
-    text = str(find_offset(seen_turns(track, 3, 10, 120 * MS, rng), track))
-    assert text.startswith("-0.1")
-    assert "confidence 0.9" in text or "confidence 1.0" in text
+    text = find_offset(seen_turns(track, 3, 10, 120 * MS, rng), track).evidence
+    assert text.startswith(("confidence 0.9", "confidence 1.0"))
+    assert "degrees a second" in text
 
 
 def fed(

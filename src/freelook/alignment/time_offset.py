@@ -65,11 +65,13 @@ class TimeOffset:
     def sure(self) -> bool:
         return self.confidence > SURE
 
-    def __str__(self) -> str:
+    @property
+    def evidence(self) -> str:
+        """What speaks for it, for people."""
         return (
-            f"{self.offset_ns / NS_PER_S:+.4f} s, confidence {self.confidence:.2f} "
-            f"(correlation {self.correlation:.2f}, next best {max(self.second, 0):.2f}, "
-            f"± {self.uncertainty_ns / 1e6:.1f} ms, turning {self.excitation_deg_s:.1f} deg/s rms)"
+            f"confidence {self.confidence:.2f} (correlation {self.correlation:.2f}, "
+            f"next best {self.second:.2f}, ± {self.uncertainty_ns / 1e6:.1f} ms, "
+            f"turning by {self.excitation_deg_s:.1f} degrees a second rms)"
         )
 
 

@@ -6,12 +6,14 @@ import argparse
 from typing import TYPE_CHECKING
 
 from ..attitude import AttitudeBuffer
+from ..attitude_track import AttitudeTrack
 from ..clock import NS_PER_S
 from ..errors import AttitudeError
 from ..gimbal import LIMITS, MODES, GimbalSettings, Stabiliser, parse_shape, parse_target
 from ..prediction import PREDICTORS
-from ..types import AccessUnit
+from ..types import AccessUnit, Attitude
 from ..vehicle import Vehicle
+from ._recording_time import seconds_or_auto
 
 if TYPE_CHECKING:  # slow to load, and may be missing
     from ..attitudes._log import LogSource
@@ -20,7 +22,7 @@ if TYPE_CHECKING:  # slow to load, and may be missing
 WHOLE_LOG_S = 1e9
 
 
-def add_mode_arguments(parser: argparse.ArgumentParser) -> None:
+def add_mode_arguments(parser: argparse.ArgumentParser, *, recording: bool = False) -> None:
     parser.add_argument(
         "--mode",
         choices=MODES,
@@ -36,9 +38,12 @@ def add_mode_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--attitude-offset",
-        type=float,
+        type=seconds_or_auto if recording else float,
         metavar="S",
-        help="attitude time minus video time in seconds (default 0)",
+        help="attitude time minus video time in seconds: a log's time at the first picture "
+        "(default: found from what both have seen of the vehicle's turning)"
+        if recording
+        else "attitude time minus video time in seconds (default 0)",
     )
     parser.add_argument(
         "--point",
@@ -133,19 +138,24 @@ def vehicle_for(args: argparse.Namespace, ingest: Ingest) -> Vehicle:
     return Vehicle(stabiliser, source)
 
 
-def stabiliser_from_log(args: argparse.Namespace) -> Stabiliser:
-    """For a recording: knowing the whole log. AttitudeError when it cannot be read or says nothing
-    about the start of the video."""
+def log_for(args: argparse.Namespace) -> LogSource:
+    """The log of --attitude; AttitudeError when it cannot be read or is none."""
     from ..attitudes import open_attitude
     from ..attitudes._log import LogSource
 
-    stabiliser = stabiliser_for(args, AttitudeBuffer(span_s=WHOLE_LOG_S))
-    if args.attitude is None:
-        return stabiliser
     source = open_attitude(args.attitude)
     if not isinstance(source, LogSource):
         raise AttitudeError(f"--attitude {args.attitude}: a recording needs a log, not a live one")
-    start_ns, last_ns = int(source.track.times_ns[0]), int(source.track.times_ns[-1])
+    return source
+
+
+def stabiliser_from_log(args: argparse.Namespace, track: AttitudeTrack | None) -> Stabiliser:
+    """For a recording: knowing the log's track. AttitudeError when it says nothing about the start
+    of the video."""
+    stabiliser = stabiliser_for(args, AttitudeBuffer(span_s=WHOLE_LOG_S))
+    if track is None:
+        return stabiliser
+    start_ns, last_ns = int(track.times_ns[0]), int(track.times_ns[-1])
     if not start_ns - NS_PER_S <= stabiliser.offset_ns < last_ns:
         raise AttitudeError(
             f"--attitude {args.attitude}: the log knows the time from {start_ns / NS_PER_S:.3f} to "
@@ -153,7 +163,8 @@ def stabiliser_from_log(args: argparse.Namespace) -> Stabiliser:
             f"{stabiliser.offset_ns / NS_PER_S:.3f} s of it; give --attitude-offset: the log's "
             "time at the first picture"
         )
-    _push_log(stabiliser, source)
+    for index, t_ns in enumerate(track.times_ns.tolist()):
+        stabiliser.push(Attitude(t_ns, track.world_from_body[index]))
     return stabiliser
 
 

@@ -3,7 +3,8 @@
   freelook render flight.mp4 left.mp4 --lens cam.json --yaw -35 --pitch 20 --hfov 80
   freelook render flight.mp4 view.mp4 --lens cam.json --poses head.csv --size 1920x1080
   freelook render shot.png view.png --lens cam.json --yaw 30
-  freelook render flight.mp4 level.mp4 --lens cam.json --mode horizon --attitude flight.ulg
+  freelook render flight.mp4 level.mp4 --lens cam.json --stabilize horizon --attitude flight.ulg
+  freelook render GX010001.MP4 calm.mp4 --lens cam.json --stabilize smooth --attitude GX010001.MP4
 
 Frame times and sound are kept. Interrupted with Ctrl-C, what was written plays.
 """
@@ -24,14 +25,15 @@ from ..gimbal import LensLimit
 from ..mailbox import Mailbox
 from ..pose_script import read_script
 from ..rotations import body_from_view
-from ..session import Aim, Session
+from ..session import Session
 from ..types import ColorSpace, Frame
 from ..viewport import Viewport
 from ._arguments import size
 from ._cameras import add_lens_arguments, mounted_camera
 from ._circles import camera_by_circle
+from ._recording_aim import RecordingAim, add_stabilize_arguments, recording_aim
 from ._renderers import add_renderer_arguments, opened_renderer
-from ._stabilising import add_mode_arguments, stabiliser_from_log
+from ._stabilising import add_mode_arguments
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -54,7 +56,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--size", type=size, default=(1280, 720), metavar="WxH", help="of the view (1280x720)"
     )
-    add_mode_arguments(parser)
+    add_mode_arguments(parser, recording=True)
+    add_stabilize_arguments(parser)
     add_renderer_arguments(parser)
     parser.add_argument("--overwrite", action="store_true", help="replace OUT if it exists")
 
@@ -63,10 +66,11 @@ def run(args: argparse.Namespace) -> int:
     from ..media.pictures import is_picture
 
     viewport = Viewport(args.size, args.hfov)
-    aim = _Aim(args)
+    look = _look(args)
     if os.path.realpath(args.input) == os.path.realpath(args.output):
         raise FreelookError("IN and OUT are the same file; name another OUT")
     camera = mounted_camera(args, lambda fov_deg: camera_by_circle(args.input, fov_deg))
+    aim = recording_aim(args, look, camera, viewport)
     if is_picture(args.input):
         _render_picture(args, camera, aim, viewport)
     else:
@@ -75,29 +79,8 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-class _Aim:
-    """The head's direction in the stabilised base; times are the video's."""
-
-    def __init__(self, args: argparse.Namespace) -> None:
-        self.degraded = 0
-        self.notice = ""
-        self._head = _head(args)
-        self._stabiliser = stabiliser_from_log(args)
-
-    def __call__(self, now_ns: int, _capture_ns: int) -> Rotation:
-        base = self._stabiliser.at(now_ns, now_ns)
-        if base.state == "degraded":
-            self.degraded += 1
-            self.notice = self.notice or base.notice
-        return base.body_from_base * self._head(now_ns)
-
-    def report(self, output: str) -> None:
-        """Say on how many frames the mode was not possible, if on any."""
-        if self.degraded:
-            print(f"{output}: in {self.degraded} frames {self.notice}", file=sys.stderr)
-
-
-def _head(args: argparse.Namespace) -> Callable[[int], Rotation]:
+def _look(args: argparse.Namespace) -> Callable[[int], Rotation]:
+    """Where to look relative to what is kept steady; times count from the first frame."""
     if args.poses is None:
         fixed = body_from_view(args.yaw, args.pitch, args.roll)
         return lambda _now_ns: fixed
@@ -106,7 +89,9 @@ def _head(args: argparse.Namespace) -> Callable[[int], Rotation]:
     return read_script(args.poses).pose_at
 
 
-def _render_picture(args: argparse.Namespace, camera: Camera, aim: Aim, viewport: Viewport) -> None:
+def _render_picture(
+    args: argparse.Namespace, camera: Camera, aim: RecordingAim, viewport: Viewport
+) -> None:
     from ..media.pictures import is_picture, read_picture
 
     if not is_picture(args.output):
@@ -115,7 +100,9 @@ def _render_picture(args: argparse.Namespace, camera: Camera, aim: Aim, viewport
     _write(args, [frame], camera, aim, viewport, total=1, color=frame.picture.color)
 
 
-def _render_video(args: argparse.Namespace, camera: Camera, aim: Aim, viewport: Viewport) -> None:
+def _render_video(
+    args: argparse.Namespace, camera: Camera, aim: RecordingAim, viewport: Viewport
+) -> None:
     from ..media.decoder import Decoder
     from ..offline import decoded
     from ..sources import file
@@ -145,7 +132,7 @@ def _write(
     args: argparse.Namespace,
     frames: Iterable[Frame],
     camera: Camera,
-    aim: Aim,
+    aim: RecordingAim,
     viewport: Viewport,
     *,
     total: int | None,
