@@ -60,9 +60,13 @@ class Painter:
     def paint(
         self, camera: Camera, camera_from_view: Rotation, viewport: Viewport, **more: Value
     ) -> None:
-        """The view in colour, of the picture loaded last; `more` are other uniforms."""
+        """The view in colour, of the picture loaded last; `more` are other uniforms.
+
+        With `viewer_k` among them it is shrunk for the lens of a viewer.
+        """
         uniforms = self._picture.bind() | {"grey": 0.0} | more
         defines = self._picture.defines() | self._defines
+        defines |= {"VIEWER"} if "viewer_k" in more else set()
         self._draw(defines, uniforms, camera, camera_from_view, viewport)
 
     def paint_plane(

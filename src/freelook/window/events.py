@@ -34,11 +34,16 @@ class Left:
 
 
 @dataclass(frozen=True)
+class Damaged:
+    """Its size changed, or what was shown is gone: it must be drawn anew."""
+
+
+@dataclass(frozen=True)
 class Closed:
     """The window was asked to close."""
 
 
-Event = Key | Drag | Wheel | Left | Closed
+Event = Key | Drag | Wheel | Left | Damaged | Closed
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,8 @@ from .surface import Surface
 
 IDLE_S = 0.02  # how soon a new frame is noticed while nothing moves
 STATUS_S = 0.25
+# after a window changed: drivers may still hold a buffer of its old size
+AFTER_DAMAGE = 3
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,7 @@ class Flight:
         self._shown_pose_ns: int | None = None
         self._grey, self._grey_ns = 0.0, -NS_PER_S
         self._ending = False
+        self._redraw = AFTER_DAMAGE
 
     def run(self) -> Figures:
         """Until the window is closed, Q is pressed or `stop` says so.
@@ -100,6 +103,8 @@ class Flight:
         for asked in self._pilot.take(events, self._outside.clock(), (eye.width, eye.height)):
             if asked == "quit":
                 self._ending = True
+            elif asked == "draw again":
+                self._redraw = AFTER_DAMAGE
             else:
                 self._surface.toggle_full_screen()
                 self._pacer = Pacer(period_ns(self._surface.refresh_hz), self._pacer.missed)
@@ -121,8 +126,9 @@ class Flight:
         look = self._pilot.look(latched_ns, frame.capture_ns)
         hfov_deg = self._pilot.hfov_deg
         shown = (id(frame), size, hfov_deg, grey, tuple(look.body_from_view.as_quat()))
-        if shown == self._shown:
+        if shown == self._shown and not self._redraw:
             return False
+        self._redraw = max(0, self._redraw - 1)
         self._draw(frame, camera, look.body_from_view, size, hfov_deg, grey)
         drawn_ns = self._outside.clock()
         self._surface.swap()

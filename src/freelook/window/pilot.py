@@ -17,7 +17,7 @@ from ..gimbal import Stabiliser
 from ..head import Head
 from ..rotations import body_from_view, head_angles_deg
 from ..viewport import NARROWEST_DEG, WIDEST_DEG, Viewport
-from .events import Drag, Event, Key, Left, Pad, Wheel
+from .events import Damaged, Drag, Event, Key, Left, Pad, Wheel
 
 LOOK_PER_S = 0.8  # of the field of view, with a key held
 ZOOM_PER_S = 2.0
@@ -71,7 +71,8 @@ class Pilot:
         return Look(base.body_from_base * hand, self._hand_ns)
 
     def take(self, events: Iterable[Event], now_ns: int, size: tuple[int, int]) -> list[str]:
-        """Turn, zoom, recentre; returns what is for others to do: "full screen", "quit".
+        """Turn, zoom, recentre; returns what is for others to do: "full screen", "draw again",
+        "quit".
 
         `size` is that of an eye's view in window pixels.
         """
@@ -85,6 +86,8 @@ class Pilot:
                 others += self._key(event, now_ns)
             elif isinstance(event, Left):
                 self._held.clear()
+            elif isinstance(event, Damaged):
+                others.append("draw again")
             else:
                 others.append("quit")
         return others

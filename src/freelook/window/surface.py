@@ -11,7 +11,7 @@ from typing import Any
 from ..errors import MissingExtra, SinkError
 from ..renderers.gl_context import VERSION, moderngl
 from .display_loss import watch_display
-from .events import Closed, Drag, Event, Key, Left, Pad, Wheel
+from .events import Closed, Damaged, Drag, Event, Key, Left, Pad, Wheel
 
 TITLE = "freelook"
 KEYS = {
@@ -219,6 +219,8 @@ class Surface:
         library.set_cursor_pos_callback(window, self._on_mouse)
         library.set_scroll_callback(window, self._on_wheel)
         library.set_window_focus_callback(window, self._on_focus)
+        library.set_framebuffer_size_callback(window, self._on_damage)
+        library.set_window_refresh_callback(window, self._on_damage)
         library.set_window_close_callback(window, self._on_close)
 
     def _on_key(self, _window: Any, key: int, code: int, action: int, mods: int) -> None:
@@ -246,6 +248,9 @@ class Surface:
     def _on_focus(self, _window: Any, focused: int) -> None:
         if not focused:
             self._events.append(Left())
+
+    def _on_damage(self, _window: Any, *_size: int) -> None:
+        self._events.append(Damaged())
 
     def _on_close(self, _window: Any) -> None:
         self._events.append(Closed())

@@ -1,0 +1,197 @@
+"""Keys, mouse, wheel and gamepad of the window, and who has control."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from freelook.clock import NS_PER_S
+from freelook.gimbal import Gimbal, GimbalSettings
+from freelook.head import Head
+from freelook.rotations import angle_between_deg, body_from_view, head_angles_deg
+from freelook.types import Counters, Pose
+from freelook.viewport import NARROWEST_DEG, WIDEST_DEG, Viewport
+from freelook.window.events import Closed, Damaged, Drag, Key, Left, Pad, Wheel
+from freelook.window.pilot import LOOK_PER_S, Pilot
+
+SIZE = (640, 360)
+STEP_NS = NS_PER_S // 20
+LATER_NS = NS_PER_S  # when every change is over
+
+
+class OnePose:
+    """A tracker that looked once, 20 degrees to the right and tilted."""
+
+    message = ""
+
+    def __init__(self) -> None:
+        self.counters = Counters()
+
+    def poses(self) -> Iterator[Pose]:
+        yield Pose(body_from_view(20, 5, 30), 1000)
+
+    def close(self) -> None:
+        pass
+
+
+def tracked() -> tuple[Pilot, Head]:
+    settings = GimbalSettings(lost_after_s=60, blend_s=0, rate_deg_s=36_000)
+    head = Head("one", OnePose(), Gimbal(settings), clock=lambda: 1000)
+    head.start()
+    head.close()  # waits until the pose is there
+    return Pilot({"one": head}, 90.0), head
+
+
+def angles(pilot: Pilot, now_ns: int = LATER_NS) -> tuple[float, float, float]:
+    return head_angles_deg(pilot.look(now_ns).body_from_view)
+
+
+def held(pilot: Pilot, *names: str, seconds: float = 1.0, now_ns: int = 0) -> None:
+    """Keys held so long, with the loop running."""
+    pilot.advance(now_ns)
+    pilot.take([Key(name, True) for name in names], now_ns, SIZE)
+    for _ in range(round(seconds * NS_PER_S / STEP_NS)):
+        now_ns += STEP_NS
+        pilot.advance(now_ns)
+    pilot.take([Key(name, False) for name in names], now_ns, SIZE)
+    pilot.advance(now_ns + STEP_NS)
+
+
+@pytest.mark.parametrize(
+    ("key", "yaw", "pitch"), [("left", -1, 0), ("right", 1, 0), ("up", 0, 1), ("down", 0, -1)]
+)
+def test_arrows_turn_the_view_by_a_share_of_its_field_each_second(
+    key: str, yaw: int, pitch: int
+) -> None:
+    pilot = Pilot({}, 60.0)
+    held(pilot, key, seconds=0.5)
+    turned = 0.5 * LOOK_PER_S * 60.0
+    assert angles(pilot) == pytest.approx((yaw * turned, pitch * turned, 0), abs=1e-6)
+
+
+def test_a_key_held_while_another_window_takes_the_keyboard_is_let_go() -> None:
+    pilot = Pilot({}, 60.0)
+    pilot.take([Key("left", True), Left()], 0, SIZE)
+    held(pilot, seconds=1)
+    assert angles(pilot) == pytest.approx((0, 0, 0))
+
+
+def test_a_pause_of_the_loop_turns_the_view_by_a_tenth_of_a_second_at_most() -> None:
+    pilot = Pilot({}, 90.0)
+    pilot.advance(0)
+    pilot.take([Key("right", True)], 0, SIZE)
+    pilot.advance(30 * NS_PER_S)
+    assert angles(pilot)[0] == pytest.approx(0.1 * LOOK_PER_S * 90)
+
+
+@pytest.mark.parametrize("hfov_deg", [30.0, 90.0])
+def test_a_drag_keeps_the_picture_under_the_mouse(hfov_deg: float) -> None:
+    """What was in the middle of the view is then where the mouse went: some pixels off, and a
+    pixel or two beside it, as a drag is exact in the middle only."""
+    pilot = Pilot({}, hfov_deg)
+    pilot.take([Drag(30, -12)], 5, SIZE)
+    view_from_before = pilot.look(5).body_from_view.inv() * body_from_view(0, 0)
+    x, y, z = view_from_before.apply([0, 0, 1])
+    focal_px = Viewport(SIZE, hfov_deg).focal_px
+    assert (x / z * focal_px, y / z * focal_px) == pytest.approx((30, -12), abs=1)
+    assert pilot.look(5).pose_ns == 5
+
+
+@pytest.mark.parametrize("pitch_deg", [-90.0, 90.0])
+def test_the_view_stops_straight_up_and_down(pitch_deg: float) -> None:
+    pilot = Pilot({}, 90.0)
+    pilot.take([Drag(0, np.sign(pitch_deg) * 10_000)], 0, SIZE)
+    assert angles(pilot)[1] == pytest.approx(pitch_deg, abs=1e-4)
+
+
+def test_wheel_and_keys_zoom_as_far_as_views_go() -> None:
+    pilot = Pilot({}, 90.0)
+    pilot.take([Wheel(1)], 0, SIZE)
+    assert pilot.hfov_deg == pytest.approx(90 / 1.1)
+    held(pilot, "-", seconds=1)
+    assert pilot.hfov_deg == pytest.approx(min(2 * 90 / 1.1, WIDEST_DEG))
+    held(pilot, "+", seconds=9)
+    assert pilot.hfov_deg == NARROWEST_DEG
+
+
+@pytest.mark.parametrize(
+    ("event", "asked"),
+    [
+        (Key("f", True), ["full screen"]),
+        (Key("q", True), ["quit"]),
+        (Key("escape", True), ["quit"]),
+        (Closed(), ["quit"]),
+        (Damaged(), ["draw again"]),
+        (Key("q", False), []),
+        (Key("x", True), []),
+    ],
+)
+def test_what_is_for_the_window_itself(event: Key | Damaged | Closed, asked: list[str]) -> None:
+    assert Pilot({}, 90.0).take([event], 0, SIZE) == asked
+
+
+def test_recentre_by_hand_goes_there() -> None:
+    pilot = Pilot({}, 90.0)
+    pilot.take([Drag(80, 40), Key("r", True)], 7, SIZE)
+    assert angles(pilot) == pytest.approx((0, 0, 0))
+
+
+def test_eyes_front_and_back() -> None:
+    pilot = Pilot({}, 90.0)
+    pilot.take([Drag(-80, 0)], 7, SIZE)
+    turned = angles(pilot)
+    pilot.take([Key("e", True), Key("e", False)], 8, SIZE)
+    assert angles(pilot) == pytest.approx((0, 0, 0))
+    pilot.take([Key("e", True)], 9, SIZE)
+    assert angles(pilot) == pytest.approx(turned)
+
+
+def test_a_tracker_has_control_until_something_is_touched() -> None:
+    pilot, _ = tracked()
+    assert angles(pilot) == pytest.approx((20, 5, 30))
+    assert pilot.look(LATER_NS).pose_ns == 1000
+    pilot.take([Drag(-10, 0)], LATER_NS, SIZE)
+    yaw, pitch, roll = angles(pilot)
+    assert 20 < yaw < 23
+    assert (pitch, roll) == pytest.approx((5, 0), abs=1e-6)  # from where it looked, upright
+    pilot.take([Key("g", True)], LATER_NS, SIZE)
+    assert angles(pilot) == pytest.approx((20, 5, 30))
+
+
+def test_zooming_leaves_control_where_it_is() -> None:
+    pilot, _ = tracked()
+    pilot.take([Wheel(2)], 3000, SIZE)
+    assert angles(pilot) == pytest.approx((20, 5, 30))
+
+
+def test_recentre_and_eyes_front_of_a_tracker() -> None:
+    pilot, head = tracked()
+    pilot.take([Key("r", True)], LATER_NS, SIZE)
+    straight = body_from_view(0, 0)
+    assert angle_between_deg(pilot.look(LATER_NS).body_from_view, straight) < 1e-6
+    pilot.take([Key("e", True)], LATER_NS, SIZE)
+    assert head.aim(LATER_NS).state == "disabled"
+    pilot.take([Key("e", True)], LATER_NS, SIZE)
+    assert head.aim(LATER_NS).state == "tracking"
+
+
+def test_the_right_stick_turns_and_its_buttons_act_once() -> None:
+    pilot = Pilot({}, 90.0)
+    pilot.advance(0, Pad(0.05, -0.05))
+    pilot.advance(STEP_NS, Pad(0.05, -0.05))
+    assert angles(pilot) == (0, 0, 0)  # near the middle is the middle
+    pilot.advance(2 * STEP_NS, Pad(1.0, 0.0))
+    assert angles(pilot)[0] == pytest.approx(120 / 20)
+    pilot.advance(3 * STEP_NS, Pad(0.0, -1.0, frozenset({"narrower"})))
+    assert angles(pilot)[1] > 0
+    assert pilot.hfov_deg < 90
+    for k in range(4, 6):  # held over two steps: eyes front, not back at once
+        pilot.advance(k * STEP_NS, Pad(0.0, 0.0, frozenset({"toggle"})))
+    assert angles(pilot) == pytest.approx((0, 0, 0))
+    pilot.advance(6 * STEP_NS, Pad(0.0, 0.0))
+    pilot.advance(7 * STEP_NS, Pad(0.0, 0.0, frozenset({"toggle"})))
+    assert angles(pilot)[0] > 0
+    pilot.advance(8 * STEP_NS, Pad(0.0, 0.0, frozenset({"recentre"})))
+    assert angles(pilot) == pytest.approx((0, 0, 0))
