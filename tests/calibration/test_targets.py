@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+from boards import sigmas_off
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from simulated_boards import FISHEYE, Gray, Light, Print, held, printed
 
+from freelook.calibration.calibrate import calibrate
 from freelook.calibration.drawing import Drawing
 from freelook.calibration.targets import (
     AprilGrid,
@@ -486,3 +488,20 @@ def test_drawings_have_light_margins(kind: str) -> None:
     assert len(everything) > 40
     assert (everything > 0.005).all()
     assert (everything < np.array(drawing.size) - 0.005).all()
+
+
+# --- to the end
+
+
+def test_a_camera_is_calibrated_from_each_target() -> None:
+    """The true lens within its stated uncertainty, and from all of them together."""
+    by_kind = {
+        kind: [replace(found(kind, n), name=f"{kind} {n}") for n in range(len(POSES))]
+        for kind in ("charuco", "circles", "acircles", "aprilgrid")
+    }
+    by_kind["all"] = [view for views in by_kind.values() for view in views]
+    for kind, views in by_kind.items():
+        calibration = calibrate(views, SIZE, "kannala_brandt")
+        assert not calibration.dropped
+        assert calibration.rms_px < 0.04, kind
+        assert sigmas_off(FISHEYE.camera, calibration) < 4, kind

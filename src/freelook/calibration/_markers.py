@@ -24,6 +24,7 @@ from .views import FEWEST_POINTS
 STRAY = 0.5  # of a square: how far a marker may be from where the others expect it
 ENOUGH = 0.6  # of the markers: the corners between them are found without the others
 DOUBLED = 2_000_000  # pixels: pictures up to that are looked at enlarged too, others made small
+SMALLEST_PX = 36.0  # around a marker; a smaller one cannot be read
 LIKE = 0.65  # correlation with the ideal corner; which corner it is, markers say
 REACHES = 0.5, 1.1  # pitches from what is known, that corners are looked for at
 RINGS_REACH = 0.34  # of what `likeness` looks at
@@ -89,17 +90,17 @@ def find_markers(
     parameters = cv2.aruco.DetectorParameters()
     parameters.markerBorderBits = border
     parameters.adaptiveThreshWinSizeMax = 53
-    parameters.minMarkerPerimeterRate = 0.01
     parameters.polygonalApproxAccuracyRate = 0.05  # sides are bent
     parameters.perspectiveRemovePixelPerCell = 8
     parameters.errorCorrectionRate = 1.0  # what is misread is far from where others expect it
-    detector = cv2.aruco.ArucoDetector(dictionary(name), parameters)
     seen: dict[int, Floats] = {}
     for scale in (1.0, 2.0 if gray.size <= DOUBLED else 0.5):
         if len(seen) > ENOUGH * expected:
             break
         how = cv2.INTER_CUBIC if scale > 1 else cv2.INTER_AREA
         level = cv2.resize(gray, None, fx=scale, fy=scale, interpolation=how)
+        parameters.minMarkerPerimeterRate = SMALLEST_PX * max(1.0, scale) / max(level.shape)
+        detector = cv2.aruco.ArucoDetector(dictionary(name), parameters)
         corners, numbers, _ = detector.detectMarkers(level)
         for number, at in zip(() if numbers is None else numbers.ravel(), corners, strict=True):
             place = (at.reshape(4, 2).astype(np.float64) + 0.5) / scale - 0.5
