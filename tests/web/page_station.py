@@ -33,6 +33,7 @@ class PageStation:
         self.camera = camera
         self.trackers: list[str] = []
         self.token: str | None = None
+        self.zoom = {"narrowest_deg": 10.0, "widest_deg": 150.0, "focal_px": 1e9}
         self.control_answer = 204
         self.controls: list[dict[str, str]] = []
         self.requests: list[tuple[str, str, str]] = []
@@ -65,6 +66,7 @@ class PageStation:
         app.router.add_get("/view.glsl", self._shader)
         app.router.add_get("/api/station", self._about)
         app.router.add_post("/api/control", self._control)
+        app.router.add_post("/api/mode", self._control)
         app.router.add_post("/whep", self._whep)
         app.router.add_static("/static/", PACKAGE / "web" / "static")
         runner = web.AppRunner(app, shutdown_timeout=0.1)
@@ -100,6 +102,10 @@ class PageStation:
             "hold_s": 1.0,
             "ease_s": 2.0,
             "hfov_deg": 90.0,
+            "limit": "black",
+            "modes": ["body", "horizon", "world", "follow", "point"],
+            "rate_deg_s": 240.0,
+            "zoom": self.zoom,
         }
         return web.json_response(about)
 
@@ -165,6 +171,10 @@ class PageView:
     def head(self) -> tuple[float, float, float]:
         angles = self.js("freelook.stats().angles")
         return angles["yaw"], angles["pitch"], angles["roll"]
+
+    def settles(self) -> None:
+        """Wait until no change is being eased any more."""
+        self.until("!freelook.app.command.ease.active(performance.now())")
 
     def stats(self) -> Any:
         return self.js("freelook.stats()")

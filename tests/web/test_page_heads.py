@@ -144,9 +144,11 @@ def test_real_key_presses_reach_the_head_and_stop_with_the_key(view: PageView) -
 def test_t_switches_the_head_off_and_on(view: PageView) -> None:
     view.set_head(30, 10)
     view.page.keyboard.press("t")
+    view.settles()
     assert view.head() == pytest.approx((0, 0, 0))
     view.shows("Head is switched off: looking straight ahead")
     view.page.keyboard.press("t")
+    view.settles()
     assert view.head() == pytest.approx((30, 10, 0))
 
 

@@ -75,6 +75,7 @@ def test_a_button_gives_the_command_back(tracked: PageView) -> None:
     tracked.page.get_by_role("button", name="Give back to opentrack").click()
     pose(tracked, 5, -5)
     assert tracked.js("freelook.headSource") == "opentrack"
+    tracked.settles()
     assert tracked.head() == pytest.approx((5, -5, 0), abs=1e-6)
 
 

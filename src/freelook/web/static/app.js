@@ -10,6 +10,7 @@ import { HandHead } from './hand.js';
 import { notify } from './instruments.js';
 import { Keyboard } from './keyboard.js';
 import { Latency } from './latency.js';
+import { LensLimit } from './limit.js';
 import { Link } from './link.js';
 import { fillPanel } from './panel.js';
 import { PhoneHead } from './phone.js';
@@ -18,7 +19,7 @@ import { Renderer } from './renderer.js';
 import { framesReceived, report } from './report.js';
 import { Screen } from './screen.js';
 import { Settings } from './settings.js';
-import { authorization, at, control } from './station.js';
+import { authorization, at, control, setMode } from './station.js';
 import { VideoFeed } from './video.js';
 import { WhepClient } from './whep.js';
 import { Zoom } from './zoom.js';
@@ -36,23 +37,26 @@ export class App {
     this.station = station;
     this.notify = notify;
     this.wake = this.wake.bind(this);
-    this.settings = new Settings();
-    this.zoom = new Zoom(station.hfov_deg);
+    this.settings = new Settings({ limit: station.limit });
+    this.zoom = new Zoom(station.hfov_deg, station.zoom);
     this.renderer = new Renderer(byId('view'), shaderBody, new Camera(station.camera));
+    this.limit = new LensLimit(this.renderer.profile, station.rate_deg_s);
     this.screen = new Screen(byId('stage'), this.renderer, this.settings, this.zoom);
     document.documentElement.classList.toggle('software', this.renderer.software);
 
     // Before there is a picture, poses are not worth the work of drawing.
     this.link = new Link(() => this.pictureMs !== null && this.posed(),
-      (rtp) => this.latency.frameTold(rtp));
+      (rtp) => this.frameTold(rtp));
     this.latency = new Latency(this.link);
     const patience = () => ({ holdS: station.hold_s, easeS: station.ease_s });
     this.hand = new HandHead();
     this.phone = new PhoneHead(this.settings, patience, this.wake);
     this.command = new Command(
       { hand: this.hand, phone: this.phone, trackers: station.trackers },
-      this.link, patience, control, (text) => this.told(text),
+      this.link, patience, control, (text) => this.told(text), station.rate_deg_s,
     );
+    /** @type {number | null} RTP time stamp of the frame in the textures */
+    this.shownRtp = null;
 
     this.counts = { received: 0, drawn: 0, draws: 0 };
     /** @type {FrameTimes | null} of a picture not drawn yet */
@@ -83,7 +87,7 @@ export class App {
     this.gamepads = new Gamepads({ command, zoom, settings, wake });
     bindButtons(actions, wake);
     makeHeadButtons(this);
-    fillPanel(byId('settings-form'), settings);
+    fillPanel(byId('settings-form'), settings, station.modes, (mode) => this.setMode(mode));
     this.start();
   }
 
@@ -129,9 +133,46 @@ export class App {
     report(this, performance.now());
   }
 
+  /** The station told about a frame. @param {number} rtp */
+  frameTold(rtp) {
+    this.latency.frameTold(rtp);
+    if (rtp === this.shownRtp) this.takeBase(); // it was drawn before we knew
+  }
+
+  /** Heads turn in the base of the frame that is shown. */
+  takeBase() {
+    const base = this.link.baseOf(this.shownRtp);
+    if (!base || base.join() === this.command.base.join()) return;
+    this.command.base = base;
+    this.wake();
+  }
+
+  /** @param {string} mode of everybody's view */
+  async setMode(mode) {
+    const why = await setMode(mode);
+    notify(why === null ? `Mode: ${mode}` : `Mode ${mode}: ${why}`);
+  }
+
+  nextMode() {
+    const { modes } = this.station;
+    const now = modes.indexOf(this.link.status?.vehicle?.mode ?? modes[0]);
+    return this.setMode(modes[(now + 1) % modes.length]);
+  }
+
+  /** Where the view looks, within the lens if that is wanted.
+   * @param {number} nowMs @returns {import('./hand.js').Aim} */
+  aim(nowMs) {
+    const aim = this.command.aim(nowMs);
+    if (this.settings.get('limit') !== 'soft') return aim;
+    const view = this.screen.viewOn(this.screen.panes().main);
+    return { ...aim, q: this.limit.apply(aim.q, view, nowMs) };
+  }
+
   /** A new picture lies in the textures. @param {FrameTimes} times */
   pictured(times) {
     this.undrawn = times;
+    this.shownRtp = times.rtp;
+    this.takeBase();
     this.pictureMs = performance.now();
     // Copying planes takes past this display frame's turn: do not wait for the next one.
     if (this.feed.path === 'planes') this.drawNow();
@@ -156,11 +197,12 @@ export class App {
     const nowMs = performance.now();
     this.keyboard.advance(nowMs);
     this.gamepads.advance(nowMs);
-    const aim = this.command.aim(nowMs);
+    const aim = this.aim(nowMs);
     const stale = this.pictureMs !== null && nowMs - this.pictureMs > STALE_S * 1000;
     this.renderer.grey = stale ? 1 : 0;
     if (this.screen.draw(aim.q, nowMs)) this.drawn(aim);
-    if (this.keyboard.active || this.gamepads.active || aim.state === 'easing') this.wake();
+    const eased = aim.state === 'easing' || this.command.ease.active(nowMs) || this.limit.moving;
+    if (this.keyboard.active || this.gamepads.active || eased) this.wake();
   }
 
   /** @param {import('./hand.js').Aim} aim */

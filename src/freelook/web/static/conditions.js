@@ -47,6 +47,7 @@ function headConditions({ head, aim, status }) {
     case 'holding': return [warn(`${name} ${silent}: holding`)];
     case 'easing': return [warn(`${name} ${silent}: easing to centre`)];
     case 'centred': return [warn(`${name} ${silent}: looking straight ahead`)];
+    case 'front': return [warn('Eyes front: looking straight ahead; Space or T goes on')];
     case 'disabled': return [warn(`${name} is switched off: looking straight ahead`)];
     default: return [];
   }
@@ -58,6 +59,7 @@ function notices({ status, fits }) {
   const trouble = status?.source.state === 'live' && status.source.message;
   if (trouble) list.push(warn(trouble));
   else if (!fits) list.push(warn('The video has another shape than the lens profile: the view is not true'));
+  if (status?.vehicle?.message) list.push(warn(`Mode ${status.vehicle.mode}: ${status.vehicle.message}`));
   if (status?.source.transcoding) list.push(info(`Transcoding: ${status.source.transcoding}`));
   return list;
 }

@@ -20,6 +20,8 @@ export function actionsOf(app) {
   return {
     recentre: () => command.recentre(),
     enable: () => command.toggle(),
+    front: () => command.toggleFront(),
+    mode: () => app.nextMode(),
     narrower: () => zoom.by(1 / 1.15),
     wider: () => zoom.by(1.15),
     pip: () => settings.set('pip', !settings.get('pip')),
@@ -37,7 +39,7 @@ export function actionsOf(app) {
 export const keysOf = (actions) => ({
   KeyR: actions.recentre, KeyC: actions.recentre, KeyT: actions.enable, KeyF: actions.full,
   KeyP: actions.pip, KeyV: actions.split, KeyH: actions.help, KeyI: actions.instruments,
-  KeyG: actions['give-back'], Escape: actions.close,
+  KeyG: actions['give-back'], KeyM: actions.mode, Space: actions.front, Escape: actions.close,
 });
 
 /** Every element with data-action does that. @param {Record<string, () => void>} actions

@@ -6,7 +6,7 @@ const RATE_DEG_PER_S = 120;
 const REACH_DEG = { yaw: 120, pitch: 70 };
 const ZOOM_PER_S = 2;
 const LONGEST_STEP_S = 0.1;
-const BUTTONS = { recentre: [0, 11], toggle: [1, 9], narrower: [5, 7, 12], wider: [4, 6, 13] };
+const BUTTONS = { recentre: [0, 11], toggle: [1, 9], front: [2, 3], narrower: [5, 7, 12], wider: [4, 6, 13] };
 
 /** Nothing near the middle, then growing from 0; finer near the middle.
  * @param {number} value -1 to 1 */
@@ -84,6 +84,7 @@ export class Gamepads {
       .map(([name]) => name));
     if (pressed.has('recentre') && !this.down.has('recentre')) command.recentre();
     if (pressed.has('toggle') && !this.down.has('toggle')) command.toggle();
+    if (pressed.has('front') && !this.down.has('front')) command.toggleFront();
     if (pressed.has('narrower')) zoom.by(ZOOM_PER_S ** -seconds);
     if (pressed.has('wider')) zoom.by(ZOOM_PER_S ** seconds);
     this.down = pressed;

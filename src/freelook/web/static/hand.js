@@ -4,8 +4,11 @@ import { IDENTITY, fromAngles, toAngles, wrapped } from './quaternion.js';
 
 /** @typedef {import('./quaternion.js').Quaternion} Quaternion */
 /** @typedef {import('./quaternion.js').Angles} Angles */
-/** @typedef {{q: Quaternion, state: string, stampMs: number | null, ageMs?: number}} Aim
- * where a head points; stampMs: when that was measured, page time */
+/** @typedef {{q: Quaternion, state: string, stampMs: number | null, ageMs?: number,
+ *   based?: boolean, left?: Quaternion, gone?: number}} Aim
+ * where a head points; stampMs: when that was measured, page time; based: in the base of the frame
+ * shown (link.js), else relative to the vehicle; gone: the share of the way straight ahead that a
+ * lost head's view has gone */
 
 export class HandHead {
   constructor() {
@@ -44,6 +47,6 @@ export class HandHead {
   /** @returns {Aim} */
   aim() {
     if (!this.enabled) return { q: IDENTITY, state: 'disabled', stampMs: this.stampMs };
-    return { q: fromAngles(this.angles), state: 'tracking', stampMs: this.stampMs };
+    return { q: fromAngles(this.angles), state: 'tracking', stampMs: this.stampMs, based: true };
   }
 }

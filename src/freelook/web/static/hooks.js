@@ -22,7 +22,7 @@ export function makeHooks(app) {
   /** @type {import('./viewport.js').Viewport | null} */
   let chosen = null;
   const view = () => chosen ?? wholePixels(app.screen.viewOn(app.screen.panes().main));
-  const q = () => app.command.aim(performance.now()).q;
+  const q = () => app.aim(performance.now()).q;
   return {
     ready: true,
     app,
@@ -79,7 +79,7 @@ function putPicture(app, { width, height, planes, matrix = 'bt709', fullRange = 
 
 /** @param {import('./app.js').App} app */
 function stats(app) {
-  const aim = app.command.aim(performance.now());
+  const aim = app.aim(performance.now());
   const { width, height } = app.renderer.picture;
   return {
     ...app.frameCounts(),
@@ -91,6 +91,7 @@ function stats(app) {
     headState: aim.state,
     angles: toAngles(aim.q),
     fieldDeg: app.zoom.fieldDeg,
+    mode: app.link.status?.vehicle?.mode ?? 'body',
     grey: app.renderer.grey,
     badMessages: app.link.bad,
     size: [width, height],

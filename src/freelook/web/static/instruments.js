@@ -70,6 +70,14 @@ export function showSource(name, state, detail) {
   write(byId('source-detail'), detail);
 }
 
+/** @param {import('./link.js').Vehicle} [vehicle] */
+export function showMode({ mode, state } = { mode: 'body', effective: 'body', state: '', message: '' }) {
+  write(byId('mode'), mode);
+  byId('mode').dataset.state = state;
+  const select = /** @type {HTMLSelectElement | null} */ (document.getElementById('mode-select'));
+  if (select && document.activeElement !== select) select.value = mode;
+}
+
 /** @param {string} head who is in command @param {string} state @param {string | null} before */
 export function showHead(head, state, before) {
   for (const button of byId('heads').querySelectorAll('button')) {

@@ -1,18 +1,23 @@
 // The data channel "head": poses and frame times from the station, and its clock.
 
-import { normalised } from './quaternion.js';
+import { IDENTITY, normalised } from './quaternion.js';
 import { ClockOffset } from './statistics.js';
 
 /** @typedef {import('./quaternion.js').Quaternion} Quaternion */
-/** @typedef {{q: Quaternion, state: string, stampMs: number | null, receivedMs: number}} StationPose
- * stampMs: when the tracker measured it, page time; null if not known */
+/** @typedef {{q: Quaternion, state: string, stampMs: number | null, receivedMs: number,
+ *   left: Quaternion, based: boolean}} StationPose
+ * stampMs: when the tracker measured it, page time; null if not known. based: q turns in the base
+ * of the frame shown; then `left` is what is left of an earlier aim */
+/**
+ * @typedef {{mode: string, effective: string, state: string, message: string}} Vehicle
+ * mode: what was asked for; effective: what is */
 /**
  * @typedef {object} Status
  * @property {{state: string, message: string, age_ms: number | null, codec: string,
  *   size: [number, number] | null, transcoding: string | null, counters: Record<string, number>}} source
  * @property {{name: string, state: string, message: string, age_ms: number | null,
  *   rate_hz: number, counters: Record<string, number>}[]} trackers
- * @property {number} viewers
+ * @property {number} viewers @property {Vehicle} [vehicle]
  */
 
 export const SILENT_MS = 1000; // the station sends its status four times a second
@@ -28,6 +33,10 @@ export class Link {
     this.poses = new Map();
     /** @type {Map<number, number>} RTP time stamp to arrival at the station, its nanoseconds */
     this.arrivals = new Map();
+    /** @type {Map<number, Quaternion>} RTP time stamp to the base in which heads turn in the frame */
+    this.bases = new Map();
+    /** of the newest frame told about */
+    this.newestBase = IDENTITY;
     /** @type {Status | null} */
     this.status = null;
     this.bad = 0;
@@ -84,19 +93,26 @@ export class Link {
   }
 
   /** @param {any} message @param {number} nowMs */
-  pose({ tracker, q, state, t }, nowMs) {
+  pose({ tracker, q, state, t, left, based = false }, nowMs) {
     const unit = Array.isArray(q) ? normalised(q) : null;
     if (!unit || typeof tracker !== 'string') return false;
-    this.poses.set(tracker, { q: unit, state, stampMs: this.clock.pageMs(t), receivedMs: nowMs });
+    this.poses.set(tracker, {
+      q: unit, state, stampMs: this.clock.pageMs(t), receivedMs: nowMs, based: based === true,
+      left: (Array.isArray(left) ? normalised(left) : null) ?? IDENTITY,
+    });
     this.onPose();
     return true;
   }
 
   /** @param {any} message */
-  frame({ rtp, arrival }) {
+  frame({ rtp, arrival, base }) {
     if (!Number.isFinite(rtp) || !Number.isFinite(arrival)) return false;
+    this.newestBase = (Array.isArray(base) ? normalised(base) : null) ?? IDENTITY;
     this.arrivals.set(rtp, arrival);
-    if (this.arrivals.size > FRAMES_KEPT) this.arrivals.delete(this.arrivals.keys().next().value ?? 0);
+    this.bases.set(rtp, this.newestBase);
+    for (const kept of [this.arrivals, this.bases]) {
+      if (kept.size > FRAMES_KEPT) kept.delete(kept.keys().next().value ?? 0);
+    }
     this.onFrame(rtp);
     return true;
   }
@@ -106,6 +122,12 @@ export class Link {
     if (!message.source || !Array.isArray(message.trackers)) return false;
     this.status = message;
     return true;
+  }
+
+  /** The base of a frame; of the newest one, where it is not known which frame it is; null for one
+   * that was not told about yet. @param {number | null} rtp @returns {Quaternion | null} */
+  baseOf(rtp) {
+    return rtp === null ? this.newestBase : this.bases.get(rtp) ?? null;
   }
 
   /** When the frame came to the station, page time; null if not known.

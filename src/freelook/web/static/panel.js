@@ -2,8 +2,9 @@
 
 import { INPUTS } from './settings.js';
 
-/** @param {HTMLElement} form @param {import('./settings.js').Settings} settings */
-export function fillPanel(form, settings) {
+/** @param {HTMLElement} form @param {import('./settings.js').Settings} settings
+ * @param {string[]} modes @param {(mode: string) => void} setMode */
+export function fillPanel(form, settings, modes, setMode) {
   const rows = Object.entries(INPUTS).map(([input, { title, axes }]) =>
     fieldset(title, axes.map((axis) => axisRow(settings, input, axis))));
   rows[0].append(choice(settings, 'dragMoves', 'Dragging moves',
@@ -13,9 +14,22 @@ export function fillPanel(form, settings) {
   const reset = element('button', { type: 'button', textContent: 'Reset all' });
   reset.addEventListener('click', () => {
     settings.reset();
-    fillPanel(form, settings);
+    fillPanel(form, settings, modes, setMode);
   });
-  form.replaceChildren(...rows, reset);
+  const view = fieldset('View', [modeRow(modes, setMode), choice(settings, 'limit',
+    'Past the lens’s edge', [['black', 'black'], ['soft', 'stop softly before it']])]);
+  form.replaceChildren(...rows, view, reset);
+}
+
+/** Of everybody's view, at the station. @param {string[]} modes
+ * @param {(mode: string) => void} setMode */
+function modeRow(modes, setMode) {
+  const select = element('select', { id: 'mode-select' });
+  for (const mode of modes) select.append(element('option', { value: mode, textContent: mode }));
+  select.addEventListener('change', () => setMode(select.value));
+  const row = element('label', { className: 'row' });
+  row.append(element('span', { textContent: 'Mode, for all viewers' }), select);
+  return row;
 }
 
 /** @param {string} title @param {HTMLElement[]} rows */

@@ -80,8 +80,8 @@ export class PhoneHead {
     const turned = multiply(about(1, -this.neutral.yawDeg), this.levelFromView);
     const q = this.scaled(multiply(turned, this.neutral.mount));
     const ageMs = nowMs - this.stampMs;
-    if (ageMs < SILENT_MS) return { q, state: 'tracking', stampMs: this.stampMs, ageMs };
-    return { ...afterLoss(q, ageMs / 1000, this.patience()), stampMs: null, ageMs };
+    if (ageMs < SILENT_MS) return { q, state: 'tracking', stampMs: this.stampMs, ageMs, based: true };
+    return { ...afterLoss(ageMs / 1000, this.patience()), q, stampMs: null, ageMs, based: true };
   }
 
   /** @param {Quaternion} q @returns {Quaternion} */

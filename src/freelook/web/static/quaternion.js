@@ -64,6 +64,18 @@ export function toAngles(q) {
   return { yaw: Math.atan2(xz, zz) / RAD, pitch, roll: Math.atan2(yx, yy) / RAD };
 }
 
+/** About a unit axis. @param {Vector} axis @param {number} angle radians @returns {Quaternion} */
+export const turned = ([x, y, z], angle) => {
+  const sine = Math.sin(angle / 2);
+  return [Math.cos(angle / 2), x * sine, y * sine, z * sine];
+};
+
+/** Radians of the rotation that leads from a to b. @param {Quaternion} a @param {Quaternion} b */
+export function angleBetween(a, b) {
+  const [w, x, y, z] = multiply(inverse(a), b);
+  return 2 * Math.atan2(Math.hypot(x, y, z), Math.abs(w));
+}
+
 /** @param {Quaternion} q @param {Vector} v @returns {Vector} */
 export const rotate = (q, v) => apply(matrix(q), v);
 

@@ -19,6 +19,7 @@ export function report(app, nowMs) {
     aim,
     fits: fits(app.renderer),
   }));
+  instruments.showMode(link.status?.vehicle);
   instruments.showHead(head, aim.state, command.before);
   const { head: headDial, video, videoSince } = app.latency.summary(nowMs);
   instruments.showDial('head', headDial, 'since pose');

@@ -108,6 +108,7 @@ export class Screen {
     this.ratio = Math.min(devicePixelRatio, MOST_RATIO, fitting);
     const { canvas } = this.renderer;
     const size = [width, height].map((length) => Math.max(1, Math.round(length * this.ratio)));
+    this.zoom.spanPx = Math.max(...size);
     if (canvas.width !== size[0]) canvas.width = size[0];
     if (canvas.height !== size[1]) canvas.height = size[1];
   }

@@ -18,10 +18,12 @@ const DEFAULTS = {
 };
 
 export class Settings {
-  constructor(storage = safeStorage()) {
+  /** @param {Record<string, any>} [usual] what the station wants where the user chose nothing */
+  constructor(usual = {}, storage = safeStorage()) {
     this.storage = storage;
+    this.usual = { ...DEFAULTS, ...usual };
     /** @type {Record<string, any>} */
-    this.values = { ...DEFAULTS, ...stored(storage) };
+    this.values = { ...this.usual, ...stored(storage) };
   }
 
   /** @param {string} name */
@@ -47,7 +49,7 @@ export class Settings {
   }
 
   reset() {
-    this.values = { ...DEFAULTS };
+    this.values = { ...this.usual };
     this.storage?.removeItem(KEY);
   }
 }

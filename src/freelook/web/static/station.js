@@ -5,6 +5,9 @@
  * @property {string} version @property {string} source @property {boolean} demo
  * @property {import('./camera.js').CameraJson} camera @property {string[]} trackers
  * @property {number} hold_s @property {number} ease_s @property {number} hfov_deg
+ * @property {string} limit soft or black: past the lens's edge @property {string[]} modes
+ * @property {number} rate_deg_s of changes that are eased
+ * @property {import('./zoom.js').ZoomLimits} zoom
  */
 
 const token = new URLSearchParams(location.search).get('token');
@@ -33,12 +36,18 @@ export const getShader = async () => (await get('view.glsl')).text();
 
 /** @param {string} tracker @param {'recentre' | 'enable' | 'disable'} action
  * @returns {Promise<string | null>} null when done, else why not */
-export async function control(tracker, action) {
+export const control = (tracker, action) => post('api/control', { tracker, action });
+
+/** @param {string} mode @returns {Promise<string | null>} null when done, else why not */
+export const setMode = (mode) => post('api/mode', { mode });
+
+/** @param {string} path @param {object} what @returns {Promise<string | null>} */
+async function post(path, what) {
   try {
-    const response = await fetch(at('api/control'), {
+    const response = await fetch(at(path), {
       method: 'POST',
       headers: { ...authorization, 'Content-Type': 'application/json' },
-      body: JSON.stringify({ tracker, action }),
+      body: JSON.stringify(what),
     });
     return response.ok ? null : (await response.text()).trim() || `error ${response.status}`;
   } catch {

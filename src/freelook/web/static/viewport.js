@@ -8,9 +8,6 @@ import { apply, inverse, matrix, matrixProduct, rotate } from './quaternion.js';
 /** @typedef {import('./camera.js').Point} Point */
 /** @typedef {{width: number, height: number, hfovDeg: number}} Viewport */
 
-export const NARROWEST_DEG = 10;
-export const WIDEST_DEG = 150;
-
 const RAD = Math.PI / 180;
 
 /** @param {Viewport} view @returns {number} */
