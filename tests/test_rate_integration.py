@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from freelook.rate_integration import GRAVITY_M_S2, integrated, levelled
+from freelook.rate_integration import GRAVITY_M_S2, gyro_bias, integrated, levelled
 from freelook.rotations import angle_between_deg
 
 TIMES_S = np.arange(0, 60, 0.01)
@@ -55,6 +55,39 @@ def test_gravity_takes_off_the_drift_and_the_unknown_start() -> None:
     # one way of looking at the ends: 0.25 degrees a second times half a window of 4 s
     assert tilts_deg(found, truth).max() < 1.2
     assert np.sqrt(np.mean(tilts_deg(found, truth)[1000:-1000] ** 2)) < 0.15
+
+
+def test_the_bias_is_found_from_gravity_as_far_as_it_shows_there() -> None:
+    """A vehicle that sways about all axes and never rests; about down it shows least."""
+    truth = swaying()
+    bias = np.radians([0.8, -0.5, 0.6])
+    felt = truth.inv().apply(UP * GRAVITY_M_S2)
+    found = gyro_bias(TIMES_S, rates_of(truth) + bias, felt)
+    assert np.degrees(found - bias)[:2] == pytest.approx([0, 0], abs=0.1)
+    assert abs(np.degrees(found - bias)[2]) < 0.6
+    corrected = levelled(TIMES_S, integrated(TIMES_S, rates_of(truth) + bias - found), felt)
+    assert tilts_deg(corrected, truth).max() < 0.4
+
+
+def test_the_bias_is_found_at_rest_about_all_axes(rng: np.random.Generator) -> None:
+    """Six of sixty seconds of rest, with noise as of a cheap gyroscope."""
+    bias = np.radians([0.8, -0.5, 0.6])
+    angles = 0.3 * np.sin(np.maximum(TIMES_S - 6, 0)[:, None] * [0.8, 1.1, 1.7])
+    truth = Rotation.from_euler("ZYX", angles)
+    felt = truth.inv().apply(UP * GRAVITY_M_S2)
+    measured = rates_of(truth) + bias + rng.normal(scale=0.01, size=(len(TIMES_S), 3))
+    assert np.degrees(gyro_bias(TIMES_S, measured, felt) - bias) == pytest.approx(0, abs=0.1)
+    unknown = np.full_like(felt, np.nan)  # without an accelerometer too
+    assert np.degrees(gyro_bias(TIMES_S, measured, unknown) - bias) == pytest.approx(0, abs=0.1)
+
+
+def test_a_vehicle_that_speeds_up_is_not_taken_for_one_that_turns() -> None:
+    """Ten seconds without rest, with an acceleration forward that fades away, and no bias."""
+    times_s = TIMES_S[:1000]
+    truth = swaying()[:1000]
+    pushed = UP * GRAVITY_M_S2 + np.array([2.5, 0, 0]) * np.exp(-times_s / 3)[:, None]
+    found = gyro_bias(times_s, rates_of(swaying())[:1000], truth.inv().apply(pushed))
+    assert np.degrees(np.linalg.norm(found)) < 0.8
 
 
 def test_hard_manoeuvres_are_not_taken_for_gravity() -> None:

@@ -206,10 +206,14 @@ def test_px4_integrated_agrees_with_the_autopilot(shared_data: Path) -> None:
     times = np.arange(autopilot.start_ns + 10**8, autopilot.times_ns[-1] - 10**8, 10**7)
     tilts = [t.at(times).inv().apply([0.0, 0.0, -1.0]) for t in (autopilot, ours)]
     apart_deg = np.degrees(np.arccos(np.clip(np.sum(tilts[0] * tilts[1], axis=1), -1, 1)))
-    # measured: 0.21 rms and 1.15 at most, while it is shaken by hand; the autopilot's own filter
+    # measured: 0.12 rms and 1.01 at most, while it is shaken by hand; the autopilot's own filter
     # is not exact either
-    assert np.sqrt(np.mean(apart_deg**2)) < 0.3
+    assert np.sqrt(np.mean(apart_deg**2)) < 0.2
     assert apart_deg.max() < 1.5
+    # at rest for a minute, where the gyroscope's bias is seen: measured 0.3; with it, 11
+    headings = [np.unwrap(t.at(times).as_euler("ZYX")[:, 0]) for t in (autopilot, ours)]
+    drifted = np.degrees(np.ptp((headings[1] - headings[0])[[0, -1]]))
+    assert drifted < 1.0
 
 
 @pytest.mark.data

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..attitude_track import AttitudeTrack, track_of
 from ..errors import AttitudeError
-from ..rate_integration import integrated, levelled
+from ..rate_integration import gyro_bias, integrated, levelled
 from ..types import Attitude, Counters
 
 Floats = NDArray[np.float64]
@@ -78,13 +78,14 @@ def log_of_rates(
     if len(times_ns) < 2:
         raise AttitudeError(f"{name}: fewer than two samples of a gyroscope in the order of time")
     times_s = (times_ns - times_ns[0]) / 1e9
-    attitude = integrated(times_s, rates)
+    felt = np.full_like(rates, np.nan)
     if accelerations is None:
         notes = (*notes, f"{NOTE_RATES}; no accelerometer, so the start is taken to be level")
     else:
         felt = np.where(np.abs(accelerations) < 1e4, accelerations, np.nan)[fine]
-        attitude = levelled(times_s, attitude, felt)
         notes = (*notes, NOTE_RATES)
+    rates = rates - gyro_bias(times_s, rates, felt)
+    attitude = levelled(times_s, integrated(times_s, rates), felt)
     counters = Counters()
     if left_out := len(fine) - len(times_ns):
         counters.add("left out", left_out)
