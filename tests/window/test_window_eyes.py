@@ -124,7 +124,7 @@ def test_the_viewers_lens_is_made_up_for(context: Any) -> None:
 def test_a_window_of_an_odd_or_tiny_size(context: Any) -> None:
     for size in ((241, 121), (5, 4)):
         for layout in ("mono", "side-by-side", "top-bottom"):
-            view = painted(context, Optics(layout), size)  # type: ignore[arg-type]
+            view = painted(context, Optics(layout), size)
             assert view.shape == (size[1], size[0], 3)
             assert view.max() > 50
 
