@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import pytest
@@ -47,6 +48,26 @@ def test_what_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     path.write_text("mine")
     assert f"{path} exists; --overwrite" in refused(capsys, *out)
     assert path.read_text() == "mine"
+
+
+class NoReportLab:
+    """As if it were not installed."""
+
+    def find_spec(self, name: str, path: object = None, target: object = None) -> None:
+        if name == "reportlab":
+            raise ModuleNotFoundError(f"No module named '{name}'", name=name)
+
+
+def test_a_pdf_needs_its_library(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An SVG does not."""
+    for name in [name for name in sys.modules if name.split(".")[0] == "reportlab"]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.delitem(sys.modules, "freelook.report.sheet_pdf", raising=False)
+    monkeypatch.setattr(sys, "meta_path", [NoReportLab(), *sys.meta_path])
+    assert "pip install 'freelook[print]'" in refused(capsys, "-o", str(tmp_path / "a.pdf"))
+    assert main(["calibrate", "board", "-o", str(tmp_path / "a.svg")]) == 0
 
 
 def test_help_names_every_kind(capsys: pytest.CaptureFixture[str]) -> None:
