@@ -129,13 +129,13 @@ def test_settings_are_names_and_numbers(capsys: pytest.CaptureFixture[str]) -> N
 
 @pytest.mark.data
 def test_real_heads(shared_data: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Two users of a headset, 10 s of each; both sides predict."""
+    """Two users of a headset, 6 s of each; both sides predict."""
     files = sorted((shared_data / "head_motion").glob("*_quaternion.txt"))
     who = ["--gimbal", "brushless", "--predict", "both", "--predictor", "constant_rate"]
-    assert duel(*files, *who, "--start", "40", "--seconds", "10") == 0
+    assert duel(*files, *who, "--start", "40", "--seconds", "6") == 0
     out = capsys.readouterr().out
-    assert "user1_quaternion, 10 s" in out
-    assert "user2_quaternion, 10 s" in out
+    assert "user1_quaternion, 6 s" in out
+    assert "user2_quaternion, 6 s" in out
     found = tables(out)
     assert len(found) == 2
     for table in found:

@@ -45,7 +45,7 @@ def steady(
     return HeadMotion("steady", times, body_from_angles(angles))
 
 
-TURNING = steady(yaw_deg_s=40, seconds=20)
+TURNING = steady(yaw_deg_s=40, seconds=14)
 
 
 def lag_of_turning(shown: Shown) -> float:
@@ -70,7 +70,7 @@ def test_without_motors_the_lag_is_the_sum_of_the_delays(link: str) -> None:
     """For a head that never stops: every phase of every clock counts alike."""
     chosen = ideal(settings(link=link))
     shown, _ = gimbal_chain(TURNING, chosen)
-    # 1 ms: a motor's 1 ms step, and phases of clocks that have not all met in 20 s
+    # 1 ms: a motor's 1 ms step, and phases of clocks that have not all met in 14 s
     assert lag_of_turning(shown) == pytest.approx(chosen.gimbal_lag_ms, abs=1.0)
     assert lag_of_turning(freelook_chain(TURNING, chosen)) == pytest.approx(
         chosen.freelook_lag_ms, abs=0.5

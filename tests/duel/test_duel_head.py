@@ -59,7 +59,7 @@ def test_poses_that_repeat_are_left_out_also_with_the_other_sign(tmp_path: Path)
     ("rows", "words"),
     [
         ([], "no poses"),
-        (["0 0 1 0 0"], "line 2: six numbers"),
+        (["0 0 1 0 0"], "line 2: numbers for timestamp viewpoint w x y z"),
         (["0 0 1 0 0 0", "1 0 one 0 0 0"], "line 3"),
         (["0 0 1 0 0 nan"], "line 2"),
         (["0 0 2 0 0 0"], "unit length"),
@@ -78,8 +78,17 @@ def test_files_that_are_none(tmp_path: Path) -> None:
     with pytest.raises(TrackerError, match="not a text file"):
         read_head(tmp_path / "bytes")
     (tmp_path / "other.csv").write_text("a,b,c\n")
-    with pytest.raises(TrackerError, match="the first line must be 'timestamp viewpoint w x y z'"):
+    with pytest.raises(TrackerError, match="must name the columns timestamp w x y z"):
         read_head(tmp_path / "other.csv")
+
+
+def test_columns_are_found_by_their_names(tmp_path: Path) -> None:
+    path = tmp_path / "other.csv"
+    path.write_text("x,y,z,w,timestamp\n0,0,0,1,3\n0,0,0.6,0.8,4\n")
+    head = read_head(path)
+    assert head.duration_ns == 1_000_000_000
+    yaw = -2 * np.degrees(np.arctan2(0.6, 0.8))
+    assert angle_between_deg(head.poses[1], body_from_view(yaw, 0)) < 1e-9
 
 
 def test_a_pose_script_is_a_head_too(tmp_path: Path) -> None:

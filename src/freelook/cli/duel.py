@@ -1,9 +1,9 @@
 """freelook against a servo gimbal: the same head, camera, link and display, modelled and measured.
 
-Each HEAD_FILE is a recording of a head: lines of 'timestamp viewpoint w x y z', or a pose script
-(t_s,yaw_deg,pitch_deg,roll_deg). Without one, a made-up head moves for a minute. The recorded
-motion goes through two chains of delays: freelook's, which turns a virtual camera in the video
-that has arrived, and a gimbal's, whose motors turn the camera itself.
+Each HEAD_FILE is a recording of a head: a first line that names its columns, timestamp and w x y z
+among them, or a pose script (t_s,yaw_deg,pitch_deg,roll_deg). Without one, a made-up head moves for
+a minute. The motion goes through two chains of delays: freelook's, which turns a virtual camera in
+the video that has arrived, and a gimbal's, whose motors turn the camera itself.
 
 Told are the angle between where the head looks and what it is shown at that time (median, 95th
 and 99th percentile), the lag by cross-correlation, how late a turn of 60 degrees is shown, and how
@@ -284,7 +284,10 @@ def _write_json(args: argparse.Namespace, found: list[Duel], chosen: dict[str, F
         "link": args.link,
         "predict": args.predict,
         "settings": {
-            name: {"value": figure.value, "source": figure.source}
+            name: {
+                "value": figure.value if math.isfinite(figure.value) else None,  # no limit
+                "source": figure.source,
+            }
             for name, figure in chosen.items()
         },
         "heads": [duel.numbers() for duel in found],

@@ -18,7 +18,7 @@ from ..rotations import FRD_FROM_RDF
 Floats = NDArray[np.float64]
 Times = NDArray[np.int64]
 
-HEADER = ("timestamp", "viewpoint", "w", "x", "y", "z")
+COLUMNS = ("timestamp", "w", "x", "y", "z")
 LEAST_STEP_NS = 1_000_000
 SYNTHETIC_SECONDS = 60.0
 TURNS = 12
@@ -79,8 +79,9 @@ class HeadMotion:
 
 
 def read_head(path: str | Path) -> HeadMotion:
-    """A recording: lines of `timestamp viewpoint w x y z` (seconds; any column called viewpoint
-    is passed over), or a pose script (`freelook.pose_script`).
+    """A recording: its first line names the columns, `timestamp` (seconds) and `w x y z` among
+    them, which turn head axes (x forward, z up) into a room's; or a pose script
+    (`freelook.pose_script`).
 
     A sample that repeats the one before it is a pose that came late, not a head that stood still:
     it is left out. TrackerError where the file cannot be read or is wrong; says where.
@@ -95,33 +96,43 @@ def read_head(path: str | Path) -> HeadMotion:
     if lines and lines[0].startswith("t_s,"):
         script = read_script(path)
         return HeadMotion(path.stem, script.times_ns - script.times_ns[0], script.poses)
-    if not lines or tuple(lines[0].split()) != HEADER:
+    names = _fields(lines[0]) if lines else []
+    if not set(COLUMNS) <= set(names):
         raise TrackerError(
-            f"{path}: the first line must be '{' '.join(HEADER)}', or that of a pose script"
+            f"{path}: the first line must name the columns {' '.join(COLUMNS)}, or be that of a "
+            "pose script"
         )
-    times, quaternions = _rows(path, lines[1:])
+    times, quaternions = _rows(path, lines[1:], names)
     return HeadMotion(path.stem, *_cleaned(path, times, quaternions))
 
 
-def _rows(path: Path, lines: list[str]) -> tuple[Floats, Floats]:
+def _fields(line: str) -> list[str]:
+    return line.replace(",", " ").split()
+
+
+def _rows(path: Path, lines: list[str], names: list[str]) -> tuple[Floats, Floats]:
     """Seconds (n,) and w, x, y, z (n, 4)."""
+    places = [names.index(name) for name in COLUMNS]
     rows = []
     for number, line in enumerate(lines, 2):
         if not line.strip():
             continue
         try:
-            row = [float(text) for text in line.split()]
-        except ValueError:
+            texts = _fields(line)
+            row = [float(texts[place]) for place in places]
+        except (ValueError, IndexError):
             row = []
-        if len(row) != len(HEADER) or not np.isfinite(row).all():
-            raise TrackerError(f"{path}: line {number}: six numbers are needed: {line!r}")
-        if not 0.9 < float(np.hypot.reduce(row[2:])) < 1.1:
+        if not row or not np.isfinite(row).all():
+            raise TrackerError(
+                f"{path}: line {number}: numbers for {' '.join(names)} are needed: {line!r}"
+            )
+        if not 0.9 < float(np.hypot.reduce(row[1:])) < 1.1:
             raise TrackerError(f"{path}: line {number}: the quaternion is not of unit length")
         rows.append(row)
     if not rows:
         raise TrackerError(f"{path}: there are no poses below the header")
     table = np.array(rows)
-    return table[:, 0], table[:, 2:]
+    return table[:, 0], table[:, 1:]
 
 
 def _cleaned(path: Path, times_s: Floats, wxyz: Floats) -> tuple[Times, Rotation]:
