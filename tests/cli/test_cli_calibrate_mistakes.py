@@ -144,3 +144,13 @@ def test_what_counts_as_blurred() -> None:
     assert not is_blurred(with_noise(np.full((300, 400), 90, np.uint8)))
     large = np.asarray(cv2.resize(sharp, (3840, 2880), interpolation=cv2.INTER_CUBIC))
     assert not is_blurred(large)  # each step of the small one is 8 pixels wide
+
+
+@pytest.mark.data
+def test_real_pictures_of_another_board_than_was_said(shared_data: Path) -> None:
+    """fish_1: 6 x 8 inner corners, said to be 7 x 9."""
+    pictures = sorted(map(str, (shared_data / "fish_1").glob("*.jpg")))[:2]
+    found = find_views(pictures, Chessboard(0.0325, (7, 9)), quiet=True)
+    said = other_size(Chessboard(0.0325, (7, 9)), found.views, found.pictures)
+    assert said.startswith("the board is said to be 7 x 9, but 2 of 2 pictures show one of 8 x 6;")
+    assert found.blurred == []
