@@ -23,6 +23,7 @@ from ..clock import NS_PER_MS, NS_PER_S
 from ..errors import TrackerError
 from ..lens import Floats
 from ..prediction import Predictor, make_predictor
+from ..rotations import angle_between_deg, body_from_view
 from ..types import Pose
 
 HORIZONS_MS = (20.0, 50.0, 100.0)
@@ -34,6 +35,12 @@ LARGEST_BYTES = 200_000_000
 STILL_SECONDS = 20.0
 STILL_RATE_HZ = 60.0
 STILL_NOISE_DEG = 0.02  # per axis, rms: a good inertial tracker at rest
+STEADY_SECONDS = 3.0
+SPEEDS_DEG_S = (1.0, 2.0, 5.0, 10.0, 20.0, 100.0)
+
+# The recordings have x forward and z up, in the world as in the head.
+NED_FROM_UP: Rotation = Rotation.from_matrix([[1, 0, 0], [0, -1, 0], [0, 0, -1]])
+FORWARD_FROM_VIEW: Rotation = Rotation.from_matrix([[0, 0, 1], [-1, 0, 0], [0, -1, 0]])
 
 
 @dataclass(frozen=True)
@@ -59,6 +66,8 @@ class Row:
 def read_recording(path: Path) -> Recording:
     """A text file with a line of column names, `timestamp` (s) and `w x y z` among them.
 
+    The quaternion turns head axes (x forward, z up) into those of a world with z up.
+
     Lines whose time does not advance, or that have anything but finite numbers, are left out.
     TrackerError for a file that cannot be read, has other columns, or fewer than 100 such lines.
     """
@@ -82,7 +91,8 @@ def read_recording(path: Path) -> Recording:
     newer = np.concatenate([[True], table[1:, 0] > np.maximum.accumulate(table[:, 0])[:-1]])
     table = table[newer]
     t_ns = np.round((table[:, 0] - table[0, 0]) * NS_PER_S).astype(np.int64)
-    return Recording(path.name, t_ns, Rotation.from_quat(table[:, [2, 3, 4, 1]]))
+    head = Rotation.from_quat(table[:, [2, 3, 4, 1]])
+    return Recording(path.name, t_ns, NED_FROM_UP * head * FORWARD_FROM_VIEW)
 
 
 def _numbers(line: str, columns: list[int]) -> list[float] | None:
@@ -139,9 +149,7 @@ def jitter_at_rest_deg(name: str, horizon_ms: float, seed: int = 2011) -> float:
     rng = np.random.default_rng(seed)
     count = round(STILL_SECONDS * STILL_RATE_HZ)
     noise = np.radians(STILL_NOISE_DEG) * rng.standard_normal((count, 3))
-    poses = Rotation.from_euler("xyz", [5.0, -20.0, 100.0], degrees=True) * Rotation.from_rotvec(
-        noise
-    )
+    poses = body_from_view(100.0, -20.0, 5.0) * Rotation.from_rotvec(noise)
     predictor = make_predictor(name)
     said = []
     for index in range(count):
@@ -150,3 +158,13 @@ def jitter_at_rest_deg(name: str, horizon_ms: float, seed: int = 2011) -> float:
         said.append(predictor.at(t_ns + round(horizon_ms * NS_PER_MS)))
     turns = Rotation.concatenate(said[round(STILL_RATE_HZ) :])
     return float(np.degrees(np.sqrt(np.mean((turns.mean().inv() * turns).magnitude() ** 2))))
+
+
+def smoothing_lag_ms(name: str, speed_deg_s: float) -> float:
+    """By how much time a predictor is late for the present, on a head that turns steadily."""
+    predictor = make_predictor(name)
+    for index in range(round(STEADY_SECONDS * STILL_RATE_HZ)):
+        t_ns = round(index * NS_PER_S / STILL_RATE_HZ)
+        now = body_from_view(speed_deg_s * t_ns / NS_PER_S, 0.0)
+        predictor.push(Pose(now, t_ns))
+    return 1000.0 * angle_between_deg(predictor.at(t_ns), now) / speed_deg_s

@@ -8,6 +8,7 @@ installed is named as skipped.
   freelook bench latency                 needs a browser; takes about a minute
   freelook bench calibrate --data FOLDER beside OpenCV and mrcal; mrcal takes minutes
   freelook bench calibrate --trials 200  random lenses instead: does it ever fail?
+  freelook bench predict FILE ...        where heads are predicted to look, on recorded motion
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import FreelookError
+from . import _predictions
 
 if TYPE_CHECKING:
     from ..bench.calibrate import Row
@@ -61,6 +63,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     calibrate.add_argument("--json", action="store_true", help="print the figures as JSON")
     calibrate.set_defaults(bench=_calibrate)
+    predict = what.add_parser("predict", help="how far predictions of recorded heads are off")
+    _predictions.add_arguments(predict)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -15,8 +15,17 @@ from scipy.spatial.transform import Rotation
 from ..errors import TrackerError
 from ..types import Counters, Pose
 from .baselines import ConstantRate, Hold
+from .learned import HeadPredictor
 
-__all__ = ["DEFAULT", "PREDICTORS", "ConstantRate", "Hold", "Predictor", "make_predictor"]
+__all__ = [
+    "DEFAULT",
+    "PREDICTORS",
+    "ConstantRate",
+    "HeadPredictor",
+    "Hold",
+    "Predictor",
+    "make_predictor",
+]
 
 
 class Predictor(Protocol):
@@ -41,8 +50,9 @@ class Predictor(Protocol):
 PREDICTORS: dict[str, Callable[[], Predictor]] = {
     "hold": Hold,
     "constant_rate": ConstantRate,
+    "head": HeadPredictor,
 }
-DEFAULT = "constant_rate"
+DEFAULT = "head"
 
 
 def make_predictor(name: str = DEFAULT) -> Predictor:

@@ -10,7 +10,6 @@ from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ..clock import NS_PER_S
 from ..lens import Floats
@@ -44,6 +43,7 @@ class PoseHistory:
         self.settings = HistorySettings() if settings is None else settings
         self.counters = Counters()
         self._poses: deque[Pose] = deque()
+        self._quats: deque[Floats] = deque()  # of the poses, each the nearer of q and -q
         self._rate_deg_s: Floats | None = None
 
     def __len__(self) -> int:
@@ -59,6 +59,7 @@ class PoseHistory:
 
     def clear(self) -> None:
         self._poses.clear()
+        self._quats.clear()
         self._rate_deg_s = None
 
     def push(self, pose: Pose) -> bool:
@@ -66,7 +67,8 @@ class PoseHistory:
 
         After a jump or a gap it is the only one left.
         """
-        if not np.isfinite(pose.body_from_view.as_quat()).all():
+        quat = pose.body_from_view.as_quat()
+        if not np.isfinite(quat).all():
             self.counters.add("not finite")
             return False
         if self._poses:
@@ -76,31 +78,36 @@ class PoseHistory:
                 return False
             self._break_off(before, pose)
         self._poses.append(pose)
+        self._quats.append(-quat if self._quats and quat @ self._quats[-1] < 0 else quat)
         self._forget(pose.t_ns)
         return True
 
-    def past(self, ages_s: Floats) -> tuple[Floats, float]:
-        """Where the head was, seen from where it is: (angles in deg (n, 3), age of the oldest, s).
+    def ages_s(self) -> Floats:
+        """How much older than the newest each pose is, oldest first; the last is 0."""
+        times_ns = np.array([pose.t_ns for pose in self._poses])
+        return (times_ns[-1:] - times_ns) / NS_PER_S
 
-        Row k is the rotation vector of newest_from_then, in axes of the newest view, at
-        `ages_s[k]` >= 0 before the newest pose, between poses by slerp; beyond the oldest pose its
-        value stays, as if the head had rested before. RuntimeError on an empty history.
+    def past_deg(self, ages_s: Floats) -> Floats:
+        """Where the head was, seen from where it is: rotation vectors in degrees, (n, 3).
+
+        Row k is that of newest_from_then, `ages_s[k]` >= 0 before the newest pose. Between poses
+        it goes along the chord, which is slerp but for thousandths of the small step. Before the
+        oldest pose the head is taken to have turned at its mean rate since; with a single pose,
+        not at all. RuntimeError without any.
         """
         if not self._poses:
             raise RuntimeError("no pose yet")
-        newest = self._poses[-1]
-        known_s = np.array([newest.t_ns - pose.t_ns for pose in self._poses]) / NS_PER_S
-        quats = np.stack([pose.body_from_view.as_quat() for pose in self._poses])
-        index = np.clip(np.searchsorted(-known_s, -ages_s), 1, max(1, len(quats) - 1))
-        if len(quats) == 1:
-            return np.zeros((len(ages_s), 3)), 0.0
-        younger, older = Rotation.from_quat(quats[index]), Rotation.from_quat(quats[index - 1])
-        step_s = known_s[index - 1] - known_s[index]
-        share = np.clip((ages_s - known_s[index]) / step_s, 0.0, 1.0)
-        turn = (younger.inv() * older).as_rotvec()
-        then = younger * Rotation.from_rotvec(share[:, None] * turn)
-        relative = newest.body_from_view.inv() * then
-        return np.degrees(relative.as_rotvec()), float(known_s[0])
+        if len(self._poses) == 1:
+            return np.zeros((len(ages_s), 3))
+        known_s, quats = self.ages_s(), np.array(self._quats)
+        after = np.searchsorted(-known_s, -ages_s).clip(1, len(quats) - 1)
+        share = (ages_s - known_s[after]) / (known_s[after - 1] - known_s[after])
+        share = share.clip(0.0, 1.0)[:, None]
+        then = quats[after] * (1.0 - share) + quats[after - 1] * share
+        past = np.degrees(_turns(quats[-1], then))
+        beyond = ages_s > known_s[0]
+        past[beyond] *= (ages_s[beyond] / known_s[0])[:, None]
+        return past
 
     def _break_off(self, before: Pose, pose: Pose) -> None:
         elapsed_s = (pose.t_ns - before.t_ns) / NS_PER_S
@@ -128,3 +135,15 @@ class PoseHistory:
         oldest_ns = now_ns - round(self.settings.span_s * NS_PER_S)
         while len(self._poses) > 2 and self._poses[1].t_ns <= oldest_ns:
             self._poses.popleft()
+            self._quats.popleft()
+
+
+def _turns(from_quat: Floats, to_quats: Floats) -> Floats:
+    """Rotation vectors of from^-1 * to, (n, 3); scalar last, `to` of any length and near `from`."""
+    x, y, z, w = from_quat
+    inverse_times = np.array([[w, z, -y, -x], [-z, w, x, -y], [y, -x, w, -z], [x, y, z, w]])
+    turned = to_quats @ inverse_times.T
+    sine = np.sqrt((turned[:, :3] ** 2).sum(axis=1))
+    angle = 2.0 * np.arctan2(sine, turned[:, 3])
+    # an angle so small has no direction, and its vector no length
+    return turned[:, :3] * (angle / np.maximum(sine, 1e-300))[:, None]
