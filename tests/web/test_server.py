@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import pytest
@@ -34,6 +35,9 @@ def test_station_describes_its_camera() -> None:
         assert about["camera"]["size"] == [960, 960]
         assert len(about["camera"]["g"]) == 256
         assert about["camera"]["camera_from_head"] == [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+        assert about["modes"] == ["body", "horizon", "world", "follow", "point"]
+        assert about["zoom"]["narrowest_deg"] == 10
+        assert about["zoom"]["focal_px"] > 1000
 
     flown(test, "script")
 
@@ -147,6 +151,7 @@ def test_too_many_viewers_are_told_to_come_back() -> None:
     [
         ('{"tracker":"script","action":"recentre"}', 204, ""),
         ('{"tracker":"script","action":"disable"}', 204, ""),
+        ('{"tracker":"script","action":"eyes_front"}', 204, ""),
         ('{"tracker":"other","action":"enable"}', 404, "known: script"),
         ('{"tracker":"script","action":"close"}', 400, "recentre, enable, disable"),
         ('{"tracker":"script"}', 400, "tracker"),
@@ -160,6 +165,23 @@ def test_control(body: str, status: int, why: str) -> None:
     async def test(station: Bench) -> None:
         got, text, _ = await ask(station, "POST", "/api/control", data=body, headers=JSON)
         assert (got, why in text) == (status, True), text
+
+    flown(test, "script")
+
+
+def test_modes_are_chosen_for_everybody_and_told() -> None:
+    async def test(station: Bench) -> None:
+        for mode, status, why in (
+            ("horizon", 204, ""),
+            ("up", 400, "known: body, horizon, world, follow, point"),
+            ("point", 409, "needs something to point at"),
+        ):
+            body = json.dumps({"mode": mode})
+            got, text, _ = await ask(station, "POST", "/api/mode", data=body, headers=JSON)
+            assert (got, why in text) == (status, True), text
+        vehicle = station.station.status()["vehicle"]
+        assert (vehicle["mode"], vehicle["effective"]) == ("horizon", "body")
+        assert "start with --attitude" in vehicle["message"]
 
     flown(test, "script")
 
