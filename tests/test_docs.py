@@ -59,7 +59,12 @@ def role_rows(package: str) -> list[tuple[str, str]]:
 
 @pytest.mark.parametrize(
     ("role", "page"),
-    [("sources", "sources.md"), ("trackers", "trackers.md"), ("sinks", "rendering.md")],
+    [
+        ("sources", "sources.md"),
+        ("trackers", "trackers.md"),
+        ("attitudes", "stabilisation.md"),
+        ("sinks", "rendering.md"),
+    ],
 )
 def test_everything_of_a_role_has_its_row(role: str, page: str) -> None:
     rows = role_rows(role)

@@ -31,6 +31,7 @@ SLOW_S = 1.0  # what changes more slowly than this says little about time, and i
 NOISE_RAD_S = float(np.radians(0.5))  # of rates from pictures, generously
 SHORTEST_S = 2.0
 SURE = 0.5
+_APART = 0.5  # a second peak of half the height is none to worry about
 _OVERLAP = 0.5  # of the video's motion, for a lag to be considered
 _FINE_NS = 1_000_000
 _REACH = 15  # fine lags to each side
@@ -57,7 +58,7 @@ class TimeOffset:
     def confidence(self) -> float:
         if self.correlation <= 0:
             return 0.0
-        apart = (self.correlation - max(self.second, 0.0)) / (0.3 * self.correlation)
+        apart = (self.correlation - max(self.second, 0.0)) / (_APART * self.correlation)
         certain = 1.0 / (1.0 + (self.uncertainty_ns / _GOOD_NS) ** 2)
         return float(self.correlation * min(1.0, max(0.0, apart)) * certain)
 
