@@ -6,12 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from freelook.clock import NS_PER_S
-from freelook.gimbal import Gimbal, GimbalSettings
+from freelook.gimbal import Gimbal, GimbalSettings, Stabiliser
 from freelook.head import Head
 from freelook.rotations import angle_between_deg, body_from_view, head_angles_deg
-from freelook.types import Counters, Pose
+from freelook.types import Attitude, Counters, Pose
 from freelook.viewport import NARROWEST_DEG, WIDEST_DEG, Viewport
 from freelook.window.events import Closed, Damaged, Drag, Key, Left, Pad, Wheel
 from freelook.window.pilot import LOOK_PER_S, Pilot
@@ -158,6 +159,21 @@ def test_a_tracker_has_control_until_something_is_touched() -> None:
     assert (pitch, roll) == pytest.approx((5, 0), abs=1e-6)  # from where it looked, upright
     pilot.take([Key("g", True)], LATER_NS, SIZE)
     assert angles(pilot) == pytest.approx((20, 5, 30))
+
+
+def test_the_vehicles_turning_is_taken_out_of_the_hands_view() -> None:
+    """Level with the horizon, in a vehicle that banks by 30 degrees."""
+    stabiliser = Stabiliser()
+    stabiliser.set_mode("horizon")
+    banked = Rotation.from_euler("x", 30, degrees=True)  # body x is forward: right wing down
+    for k in range(5 * 20):
+        stabiliser.push(Attitude(k * STEP_NS, banked))
+        stabiliser.at(k * STEP_NS, k * STEP_NS)  # the modes ease in
+    pilot, newest_ns = Pilot({}, 90.0, stabiliser), (5 * 20 - 1) * STEP_NS
+    look = pilot.look(newest_ns, newest_ns).body_from_view
+    assert head_angles_deg(look) == pytest.approx((0, 0, -30), abs=0.01)
+    pilot.take([Key("e", True)], newest_ns, SIZE)  # eyes front is the vehicle's front
+    assert angles(pilot, newest_ns) == pytest.approx((0, 0, 0), abs=0.01)
 
 
 def test_zooming_leaves_control_where_it_is() -> None:

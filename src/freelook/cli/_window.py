@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from ..camera import Camera
 from ..clock import now_ns
+from ..gimbal import LensLimit
 from ._arguments import size
 from ._progress import StatusLine, say
 from ._renderers import add_sampling_argument
@@ -94,7 +95,8 @@ def fly_in_window(args: argparse.Namespace, ingest: Ingest, camera: Camera) -> N
         line = opened.enter_context(StatusLine())
         outside = Outside(now_ns, opened.enter_context(asked_to_stop()), _report(ingest, line))
         pilot = Pilot(heads, args.hfov, vehicle.stabiliser)
-        flight = Flight(surface, frames, camera, pilot, outside, optics, args.sampling)
+        limit = LensLimit(camera) if args.limit == "soft" else None
+        flight = Flight(surface, frames, camera, pilot, outside, optics, args.sampling, limit)
         opened.callback(lambda: say(summary(flight.figures)))
         flight.run()
 

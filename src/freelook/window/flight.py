@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from ..camera import Camera
 from ..clock import NS_PER_S, Clock
 from ..errors import SinkError
+from ..gimbal import LensLimit
 from ..mailbox import Mailbox
 from ..renderers.blank import Sampling
 from ..session import same_shape
@@ -26,7 +27,7 @@ from .painting import EyesPainter
 from .pilot import Pilot
 from .surface import Surface
 
-IDLE_S = 0.02  # how soon a new frame is noticed while nothing moves
+IDLE_S = 0.005  # how soon a new frame or pose is noticed after nothing moved
 STATUS_S = 0.25
 # after a window changed: drivers may still hold a buffer of its old size
 AFTER_DAMAGE = 3
@@ -43,7 +44,7 @@ class Outside:
 
 
 class Flight:
-    """Shows `frames` on `surface`, turned by `pilot`."""
+    """Shows `frames` on `surface`, turned by `pilot`; with `limit` never past the lens."""
 
     def __init__(
         self,
@@ -54,11 +55,13 @@ class Flight:
         outside: Outside,
         optics: Optics | None = None,
         sampling: Sampling = "bilinear",
+        limit: LensLimit | None = None,
     ) -> None:
         self.figures = Figures()
         self._surface = surface
         self._frames = frames
         self._camera = camera
+        self._limit = limit
         self._pilot = pilot
         self._outside = outside
         self._optics = Optics() if optics is None else optics
@@ -124,12 +127,15 @@ class Flight:
         latched_ns = self._outside.clock()
         self._pilot.advance(latched_ns, self._surface.pad())
         look = self._pilot.look(latched_ns, frame.capture_ns)
-        hfov_deg = self._pilot.hfov_deg
-        shown = (id(frame), size, hfov_deg, grey, tuple(look.body_from_view.as_quat()))
+        hfov_deg, body_from_view = self._pilot.hfov_deg, look.body_from_view
+        if self._limit is not None:
+            viewport = self._painter.viewport(size, hfov_deg)
+            body_from_view = self._limit(body_from_view, viewport, latched_ns)
+        shown = (id(frame), size, hfov_deg, grey, tuple(body_from_view.as_quat()))
         if shown == self._shown and not self._redraw:
             return False
         self._redraw = max(0, self._redraw - 1)
-        self._draw(frame, camera, look.body_from_view, size, hfov_deg, grey)
+        self._draw(frame, camera, body_from_view, size, hfov_deg, grey)
         drawn_ns = self._outside.clock()
         self._surface.swap()
         self._surface.context.finish()  # drivers may return from a swap before it is done
