@@ -27,7 +27,7 @@ BLURRED = 1.5  # a step blurred by s is sqrt((4^2 + s^2) / (1^2 + s^2)) as steep
 FAINT = 1.0  # grey levels per pixel
 TRIED = 3  # pictures in which a larger board is looked for
 FEW_MARKERS = 4  # so few may be misread
-FITS, MISFITS = 3.0, 10.0  # times the usual distance
+FITS, MISFITS = 3.0, 5.0  # times the usual distance
 
 
 def is_blurred(gray: Gray) -> bool:
@@ -133,7 +133,7 @@ def with_turned_told(calibration: Calibration, views: Sequence[View]) -> Calibra
 
 
 def _why(calibration: Calibration, view: View, why: str) -> str:
-    camera, usual = calibration.solution.camera, max(calibration.rms_px, 0.1)
+    camera, usual = calibration.camera, max(calibration.rms_px, 0.1)
     turned = View(view.name, view.points, np.array(camera.size) - 1 - view.pixels)
     if _off_px(camera, view) > MISFITS * usual and _off_px(camera, turned) < FITS * usual:
         return (
