@@ -107,6 +107,7 @@ def test_the_list_has_every_figure_with_its_source(capsys: pytest.CaptureFixture
         (["--link", "wire"], "unknown link 'wire'; known: analogue, digital"),
         (["--set", "slew=3"], "unknown setting 'slew'; known: "),
         (["--predictor", "oracle"], "oracle"),
+        (["--predictor", "hold", "--predict", "none"], "--predict none that nobody does"),
         (["--video"], "--video needs --out DIR"),
         (["absent.txt"], "absent.txt"),
         (["--start", "300"], "nothing between 300 and"),
@@ -119,6 +120,17 @@ def test_what_cannot_be_is_one_line(
     assert duel(*arguments) == 2
     err = capsys.readouterr().err
     assert words in err.splitlines()[-1]
+
+
+def test_two_heads_of_one_name_would_overwrite_each_other(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    files = [tmp_path / folder / "head.csv" for folder in ("a", "b")]
+    for path in files:
+        path.parent.mkdir()
+        path.write_text("t_s,yaw_deg,pitch_deg,roll_deg\n0,0,0,0\n5,30,0,0\n")
+    assert duel(*files, "--out", tmp_path / "out") == 2
+    assert "two heads are called head" in capsys.readouterr().err
 
 
 def test_settings_are_names_and_numbers(capsys: pytest.CaptureFixture[str]) -> None:

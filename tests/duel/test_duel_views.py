@@ -142,7 +142,9 @@ def test_the_figure_shows_both_sides_numbers(lively: Duel) -> None:
     x, y = np.asarray(line.get_data())
     assert x[0] == pytest.approx(first_s)
     assert y == pytest.approx(values["gimbal"][np.searchsorted(seconds, x)])
-    labels = [text.get_text() for text in distribution.get_legend().get_texts()]
+    legend = distribution.get_legend()
+    assert legend is not None
+    labels = [text.get_text() for text in legend.get_texts()]
     assert f"gimbal: 5 % above {lively.gimbal.direction.p95:.2g}°" in labels
 
 

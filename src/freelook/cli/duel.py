@@ -32,7 +32,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..clock import NS_PER_S
-from ..errors import SinkError
+from ..errors import SinkError, TrackerError
 from ._progress import say
 from .simulate import positive
 
@@ -130,8 +130,8 @@ def run(args: argparse.Namespace) -> int:
     chosen = changed(figures(args.gimbal, args.link), dict(args.set))
     settings = settings_of(chosen)
     ours, theirs = _predictors(args)
-    _check_out(args)
     heads = _heads(args)
+    _check_out(args, [head.name for head in heads])
     field_deg = math.degrees(2 * load_camera(args.lens).theta_max)
     say(f"gimbal {args.gimbal}, link {args.link}, prediction: {args.predict}")
     say(f"  {_expected(settings)}")
@@ -155,6 +155,8 @@ def run(args: argparse.Namespace) -> int:
 def _predictors(args: argparse.Namespace) -> tuple[MakePredictor, MakePredictor]:
     from ..prediction import DEFAULT, make_predictor
 
+    if args.predictor and args.predict == "none":
+        raise TrackerError("--predictor says how to predict, --predict none that nobody does")
     name = args.predictor or DEFAULT
     make_predictor(name)  # says what is known, before long work
 
@@ -224,7 +226,7 @@ def _list() -> None:
                 say(f"  {key:<18} {figure.value:>8g}   {figure.source}")
 
 
-def _check_out(args: argparse.Namespace) -> None:
+def _check_out(args: argparse.Namespace, names: list[str]) -> None:
     """Everything that can be known to fail, before the work."""
     if args.video and not args.out:
         raise SinkError("--video needs --out DIR, the folder to write it to")
@@ -234,7 +236,11 @@ def _check_out(args: argparse.Namespace) -> None:
         args.out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise SinkError(f"cannot make {args.out}: {error.strerror}") from None
-    _file(args, "duel.json")
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise SinkError(f"two heads are called {twice[0]}: their files would have one name")
+    suffixes = [args.format, *(["mp4"] if args.video else [])]
+    for file in ["duel.json", *(f"{_stem(name)}.{end}" for name in names for end in suffixes)]:
+        _file(args, file)
 
 
 def _file(args: argparse.Namespace, name: str) -> Path:
@@ -243,15 +249,15 @@ def _file(args: argparse.Namespace, name: str) -> Path:
     return check_output_file(str(args.out / name), overwrite=args.overwrite)
 
 
-def _stem(duel: Duel) -> str:
-    return duel.head.name.replace(" ", "-")
+def _stem(name: str) -> str:
+    return name.replace(" ", "-")
 
 
 def _draw(args: argparse.Namespace, duel: Duel) -> None:
     from ..plots._style import save
     from ..plots.duel import duel_figure
 
-    path = _file(args, f"{_stem(duel)}.{args.format}")
+    path = _file(args, f"{_stem(duel.head.name)}.{args.format}")
     title = f"{duel.head.name}: freelook and a gimbal ({args.gimbal}, {args.link} link)"
     save(duel_figure(duel, title), path)
     say(f"  {path}")
@@ -264,7 +270,7 @@ def _film(args: argparse.Namespace, duel: Duel) -> None:
     from ..viewport import Viewport
     from ._bars import bar
 
-    path = _file(args, f"{_stem(duel)}.mp4")
+    path = _file(args, f"{_stem(duel.head.name)}.mp4")
     labels = ("freelook", f"gimbal: {args.gimbal}, {args.link} link")
     threads = os.cpu_count() or 1
     views = SideBySide(duel, load_camera(args.lens), Viewport((640, 480), 90), labels, threads)
@@ -292,5 +298,8 @@ def _write_json(args: argparse.Namespace, found: list[Duel], chosen: dict[str, F
         },
         "heads": [duel.numbers() for duel in found],
     }
-    path.write_text(json.dumps(document, indent=2) + "\n", "utf-8")
+    try:
+        path.write_text(json.dumps(document, indent=2) + "\n", "utf-8")
+    except OSError as error:
+        raise SinkError(f"cannot write {path}: {error.strerror}") from None
     say(f"{path}")

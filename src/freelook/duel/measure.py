@@ -19,7 +19,7 @@ WARM_UP_NS = NS_PER_S  # until every stage has something
 LONGEST_LAG_MS = 800
 EARLIEST_LAG_MS = -100
 LEVELS = (0.1, 0.5, 0.9)
-TURN_NS, TURN_STEP_NS = 1_500_000_000, 250_000  # watched for so long, so finely
+TURN_NS, TURN_STEP_NS = 1_500_000_000, 500_000  # watched for so long, so finely
 
 
 @dataclass(frozen=True)
