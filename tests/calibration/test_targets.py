@@ -71,7 +71,6 @@ class Shot:
     pixels: Floats
 
 
-@cache
 def paper(target: Target) -> Print:
     """The print of a target, placed so that its points are where `points` has them."""
     drawing = target.drawing

@@ -83,10 +83,15 @@ def marker_bits(name: str, number: int, border: int = 1) -> NDArray[np.bool_]:
 def find_markers(
     gray: Gray, name: str, expected: int, border: int = 1
 ) -> tuple[NDArray[np.int64], Floats]:
-    """Numbers (m,) and corners (m, 4, 2) of the markers of a dictionary in a picture.
+    """Numbers (m,) and corners (m, 4, 2) of the first `expected` markers of a dictionary.
 
-    When few of the `expected` ones are found, at another size of the picture too.
+    When few of them are found, at another size of the picture too.
     """
+    whole = dictionary(name)
+    # reading a marker takes as long as there are numbers that it can be
+    kind = cv2.aruco.Dictionary(
+        whole.bytesList[: expected + 1], whole.markerSize, whole.maxCorrectionBits
+    )
     parameters = cv2.aruco.DetectorParameters()
     parameters.markerBorderBits = border
     parameters.adaptiveThreshWinSizeMax = 53
@@ -100,7 +105,7 @@ def find_markers(
         how = cv2.INTER_CUBIC if scale > 1 else cv2.INTER_AREA
         level = cv2.resize(gray, None, fx=scale, fy=scale, interpolation=how)
         parameters.minMarkerPerimeterRate = SMALLEST_PX * max(1.0, scale) / max(level.shape)
-        detector = cv2.aruco.ArucoDetector(dictionary(name), parameters)
+        detector = cv2.aruco.ArucoDetector(kind, parameters)
         corners, numbers, _ = detector.detectMarkers(level)
         for number, at in zip(() if numbers is None else numbers.ravel(), corners, strict=True):
             place = (at.reshape(4, 2).astype(np.float64) + 0.5) / scale - 0.5
