@@ -19,7 +19,7 @@ LAYERS: list[set[str]] = [
     {"renderers", "gimbal", "prediction", "simulation", "media", "fitting", "plots", "calibration"}
     | {"alignment", "stabilisation", "resolution", "view_cost", "comparison", "duel"},
     {"sources", "trackers", "attitudes", "sinks", "formats"},
-    {"ingest", "head", "vehicle", "session", "offline"},
+    {"ingest", "head", "vehicle", "offset_finder", "session", "offline"},
     {"cli", "web", "window", "bench", "paper", "report", "doctor", "egl"},
 ]
 LAYER_OF = {name: number for number, names in enumerate(LAYERS) for name in names}
