@@ -18,6 +18,7 @@ from freelook.lens import Equidistant, Floats
 Gray = NDArray[np.uint8]
 Pictures = NDArray[np.float32]
 
+STRIDE = 8
 TURNS = np.arange(16) * np.pi / 8
 BEHIND = 0.35  # reflectance of what is behind a target
 # Places in a pixel that are looked at: a Fibonacci lattice, in which no two lie in one row or
@@ -159,12 +160,10 @@ class Studio:
         light, rng = light or Light(), rng or np.random.default_rng(0)
         width, height = self.camera.size
         value = np.full((height, width), BEHIND, np.float32)
-        texels, there = _texels(self._rays, pose, paper)
+        box = self._box(pose, paper)
+        texels, there = _texels(self._rays[_with_last(box)], pose, paper)
         if there.any():
-            rows, columns = (np.flatnonzero(there.any(axis=axis)) for axis in (1, 0))
-            box = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-            corners = np.s_[rows[0] : rows[-1] + 2, columns[0] : columns[-1] + 2]
-            value[box] = np.where(there[box], _mean(paper.texture, texels[corners]), BEHIND)
+            value[box] = np.where(_whole(there), _mean(paper.texture, texels), BEHIND)
         value = light.black + (light.white - light.black) * value
         value *= 1 - light.fall_off * np.arange(width, dtype=np.float32) / width
         value = np.where(self._lit, value, 8.0)
@@ -172,6 +171,18 @@ class Studio:
             value = cv2.GaussianBlur(value, (0, 0), light.blur_px)
         value = value + light.noise * rng.standard_normal(value.shape, np.float32)
         return np.asarray(np.clip(np.round(value), 0, 255), dtype=np.uint8)
+
+    def _box(self, pose: Pose, paper: Print) -> tuple[slice, slice]:
+        """The part of the picture that a print is in, from every eighth pixel."""
+        _, there = _texels(self._rays[::STRIDE, ::STRIDE], pose, paper)
+        if not there.any():
+            return slice(0, 0), slice(0, 0)
+        columns, rows = self.camera.size
+        parts = []
+        for axis, count in ((1, rows), (0, columns)):
+            seen = np.flatnonzero(there.any(axis=axis)) * STRIDE
+            parts.append(slice(max(0, seen[0] - STRIDE), min(count, seen[-1] + STRIDE)))
+        return parts[0], parts[1]
 
     @cached_property
     def _rays(self) -> Floats:
@@ -185,6 +196,12 @@ class Studio:
         return _whole(np.isfinite(self._rays[..., 2]))
 
 
+def _with_last(box: tuple[slice, slice]) -> tuple[slice, slice]:
+    """The corners of the pixels in a box."""
+    rows, columns = box
+    return slice(rows.start, rows.stop + 1), slice(columns.start, columns.stop + 1)
+
+
 def _whole(corners: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Pixels all of whose corners are so."""
     return corners[:-1, :-1] & corners[:-1, 1:] & corners[1:, :-1] & corners[1:, 1:]
@@ -194,8 +211,7 @@ FISHEYE = Studio(make_camera((960, 720), Equidistant(260.0), center=(487.3, 352.
 
 
 def _texels(rays: Floats, pose: Pose, paper: Print) -> tuple[Floats, NDArray[np.bool_]]:
-    """Texels at the corners of pixels (linear between them to 1e-3 px), and which pixels they
-    cover."""
+    """Texels that rays meet (linear between pixels to 1e-3 px), and which meet the print."""
     rays = np.where(np.isfinite(rays[..., 2:]), rays, [0.0, 0.0, 0.0])
     turn = pose.camera_from_target.as_matrix()
     direction, origin = rays @ turn, -pose.translation @ turn
@@ -205,7 +221,7 @@ def _texels(rays: Floats, pose: Pose, paper: Print) -> tuple[Floats, NDArray[np.
     texels = paper.texels(origin[:2] + depth[..., None] * direction[..., :2])
     rows, columns = paper.texture.shape
     on_it = (depth > 0) & ((texels >= -0.5) & (texels <= (columns - 0.5, rows - 0.5))).all(axis=-1)
-    return texels, _whole(on_it)
+    return texels, on_it
 
 
 def _mean(texture: Pictures, corners: Floats) -> Pictures:

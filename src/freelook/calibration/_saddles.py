@@ -66,8 +66,10 @@ class Slopes:
         return cls(level, x, y)
 
 
-def placed(slopes: Slopes, start: Floats, maps: LocalMaps, window: Window) -> tuple[Floats, Bools]:
-    """Corners (n, 2) near `start`, and which of them there are.
+def placed(
+    slopes: Slopes, start: Floats, maps: LocalMaps, window: Window, enough_px: float = ENOUGH_PX
+) -> tuple[Floats, Bools]:
+    """Corners (n, 2) near `start`, and which of them there are; to about `enough_px`.
 
     In grid coordinates an edge through the corner runs straight away from it, so that the slope at
     each pixel is at right angles to the way from the corner to the pixel: a linear least-squares
@@ -84,7 +86,7 @@ def placed(slopes: Slopes, start: Floats, maps: LocalMaps, window: Window) -> tu
         length = np.hypot(step[:, 0], step[:, 1])
         at[moving] += step * np.minimum(1, LONGEST_STEP_PX / np.maximum(length, 1e-9))[:, None]
         good[moving[~solvable]] = False
-        moving = moving[solvable & (length > ENOUGH_PX)]
+        moving = moving[solvable & (length > enough_px)]
         if not len(moving):
             break
     return at, good

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ..lens import Floats
 from ._corners import SEARCH, find_corners, grid_of
 from ._lattice import Bools, Cells, Lattice, LocalMaps, in_squares
-from ._saddles import LIKE, Gray, Slopes, Window, edge_blur_px, likeness, placed
+from ._saddles import ENOUGH_PX, LIKE, Gray, Slopes, Window, edge_blur_px, likeness, placed
 
 FEWEST = 12  # corners; below that a grid is chance
 FEWEST_LINES = 3
@@ -29,6 +29,7 @@ STRAY = 0.35  # of a square: how far from where its neighbours expect it a corne
 FAINT = 0.1  # of the usual contrast; what is fainter is no corner of this board
 COARSEST = 150  # pixels along the shorter side
 LARGEST = 6_000_000  # pixels: larger pictures are looked at only if smaller ones show a board
+ROUGH_PX = 0.05  # how exactly corners are placed while the board is looked for
 TINY_PX = 5.0  # squares that are looked at enlarged
 DOUBLED = 2_000_000  # pixels: pictures up to that, enlarged, are looked at before giving up
 SHARP_PX = 2.0  # blur below which nothing has to be done about it
@@ -94,7 +95,7 @@ def _board(level: Gray) -> Lattice | None:
         return None
     slopes = Slopes.of(level)
     lattice.grow(_Faint(slopes, lattice))
-    return _checked(lattice, slopes, Window())
+    return _checked(lattice, slopes, Window(), ROUGH_PX)
 
 
 def _levels(gray: Gray) -> Iterator[tuple[Gray, Floats]]:
@@ -121,7 +122,7 @@ class _Faint:
         self.least = FAINT * float(np.median(contrast))
 
     def __call__(self, cells: Cells, maps: LocalMaps) -> Floats:
-        at, good = placed(self.slopes, maps.place, maps, Window())
+        at, good = placed(self.slopes, maps.place, maps, Window(), ROUGH_PX)
         good &= in_squares(maps.axes, at - maps.place) < FAINT_SEARCH
         here = LocalMaps(np.where(good[:, None], at, maps.place), maps.axes, maps.bend, maps.known)
         alike, contrast = _alike(self.slopes, cells, here)
@@ -152,10 +153,12 @@ def _suited(slopes: Slopes, lattice: Lattice) -> Window:
     return Window(widest_px=max(wide, 10 * blur if blur > SHARP_PX else 0.0))
 
 
-def _checked(lattice: Lattice, slopes: Slopes, window: Window) -> Lattice | None:
+def _checked(
+    lattice: Lattice, slopes: Slopes, window: Window, enough_px: float = ENOUGH_PX
+) -> Lattice | None:
     """Corners placed finely; without those that look like none or are where none should be."""
     cells, maps = lattice.cells(), _corner_maps(lattice)
-    at, good = placed(slopes, maps.place, maps, window)
+    at, good = placed(slopes, maps.place, maps, window, enough_px)
     good &= maps.known & (in_squares(maps.axes, at - maps.place) < SEARCH)
     fine = _kept(cells, at, good)
     if len(fine) < FEWEST:
