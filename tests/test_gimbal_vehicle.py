@@ -121,6 +121,20 @@ def test_eyes_front_and_jumps_reach_the_heads_status() -> None:
     assert head.aim(40 * NS_PER_MS).state == "tracking"
 
 
+def test_a_trackers_buttons_reach_the_gimbal() -> None:
+    tracker = _WithButtons()
+    head = Head("test", tracker, clock=lambda: NS_PER_S)
+    head.start()
+    assert tracker.on_action is not None
+    states = []
+    for action in ("toggle", "toggle", "eyes_front", "toggle", "eyes_front", "eyes_front"):
+        tracker.on_action(action)
+        states.append(head.aim(NS_PER_S).state)
+    assert states == ["disabled", "waiting", "front", "waiting", "front", "waiting"]
+    tracker.on_action("recentre")
+    head.close()
+
+
 class _NoTracker:
     counters = Counters()
     message = ""
@@ -130,6 +144,10 @@ class _NoTracker:
 
     def close(self) -> None:
         pass
+
+
+class _WithButtons(_NoTracker):
+    on_action: Callable[[str], None] | None = None
 
 
 # --- a session and the station --------------------------------------------------------------------

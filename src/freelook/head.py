@@ -6,12 +6,21 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
 from .clock import NS_PER_S, Clock, now_ns
 from .gimbal import Aim, Gimbal
 from .types import Tracker
 
 RATE_WINDOW_S = 1.0
+LATCHED = ("disabled", "front")
+
+
+@runtime_checkable
+class HasButtons(Protocol):
+    """A tracker that also hears buttons: "recentre", "toggle" (off and on), "eyes_front"."""
+
+    on_action: Callable[[str], None] | None
 
 
 @dataclass(frozen=True)
@@ -65,6 +74,8 @@ class Head:
 
     def start(self, on_pose: Callable[[], None] = lambda: None) -> None:
         """Begin to read poses; `on_pose` runs on the tracker's thread after each."""
+        if isinstance(self._tracker, HasButtons):
+            self._tracker.on_action = self._act
         self._thread = threading.Thread(
             target=self._run, args=(on_pose,), name=f"head {self.name}", daemon=True
         )
@@ -96,6 +107,19 @@ class Head:
     def eyes_front(self, now_ns: int) -> None:
         with self._lock:
             self._gimbal.eyes_front(now_ns)
+
+    def _act(self, action: str) -> None:
+        """A button of the tracker, on its thread. What is latched is released by it."""
+        now_ns = self._clock()
+        if action == "recentre":
+            return self.recentre(now_ns)
+        state = self.aim(now_ns).state
+        if state == "front" or (action == "toggle" and state in LATCHED):
+            self.enable(now_ns)
+        elif action == "toggle":
+            self.disable(now_ns)
+        else:
+            self.eyes_front(now_ns)
 
     def status(self, now_ns: int) -> HeadStatus:
         with self._lock:

@@ -15,7 +15,7 @@ from freelook.clock import FakeClock
 from freelook.errors import TrackerError
 from freelook.rotations import head_angles_deg
 from freelook.trackers import joystick, open_tracker
-from freelook.trackers.joystick import AxisSampler, parse_inputs
+from freelook.trackers.joystick import AxisSampler, parse_buttons, parse_inputs
 
 pytest.importorskip("evdev", reason="python-evdev is not installed (freelook[evdev])")
 
@@ -36,6 +36,10 @@ class MadeUpDevice:
     axes: dict[int, Info] = field(default_factory=dict)
     present: bool = True
     closed: int = 0
+    keys: list[int] = field(default_factory=list)
+
+    def active_keys(self) -> list[int]:
+        return self.keys
 
     def absinfo(self, number: int) -> Info:
         if not self.present:
@@ -98,6 +102,26 @@ def test_an_axis_the_device_lacks_is_said(device: MadeUpDevice) -> None:
     made = sampler()
     assert made.sample(0) is None
     assert "it lacks one of the axes; choose others with inputs=" in made.message
+
+
+def test_buttons_recentre_switch_and_bring_eyes_front(device: MadeUpDevice) -> None:
+    buttons = parse_buttons("trigger,-,thumb")
+    made = AxisSampler("Radio", (X, Y, Z), 90.0, AxisMap(), buttons)
+    trigger, thumb = buttons
+    device.keys = [thumb]
+    made.sample(0)
+    asked: list[str] = []
+    made.on_action = asked.append
+    for keys in ([thumb], [thumb, 7], [], [thumb], [thumb, trigger], [thumb, trigger]):
+        device.keys = keys
+        made.sample(0)
+    assert asked == ["eyes_front", "recentre"], "not what was held when we began to listen"
+
+
+@pytest.mark.parametrize("text", ["", "south", "south,east,up", "south,east,west,north"])
+def test_buttons_that_are_none_are_refused(text: str) -> None:
+    with pytest.raises(TrackerError, match="must be three buttons"):
+        parse_buttons(text)
 
 
 @given(st.tuples(*[st.integers(-(2**31), 2**31 - 1)] * 3))

@@ -82,7 +82,7 @@ def joystick_stand_in(tmp_path: Path) -> StandIn:
     """What the kernel would say: values from -900 to 900, at tenths of degrees."""
     angles = dict(enumerate((300, 200, 100)))
     info = {number: SimpleNamespace(value=v, min=-900, max=900) for number, v in angles.items()}
-    device = SimpleNamespace(absinfo=info.get, close=lambda: None)
+    device = SimpleNamespace(absinfo=info.get, active_keys=list, close=lambda: None)
     patch = pytest.MonkeyPatch()
     patch.setattr(joystick, "open_device", lambda wanted: device)
     PLUGGED_IN.callback(patch.undo)

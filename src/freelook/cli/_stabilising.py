@@ -10,7 +10,7 @@ from ..attitude_track import AttitudeTrack
 from ..clock import NS_PER_S
 from ..errors import AttitudeError
 from ..gimbal import LIMITS, MODES, GimbalSettings, Stabiliser, parse_shape, parse_target
-from ..prediction import PREDICTORS
+from ..prediction import DEFAULT, PREDICTORS
 from ..types import AccessUnit, Attitude
 from ..vehicle import Vehicle
 from ._recording_time import seconds_or_auto
@@ -20,6 +20,7 @@ if TYPE_CHECKING:  # slow to load, and may be missing
     from ..ingest import Ingest
 
 WHOLE_LOG_S = 1e9
+AHEAD_MS = 20.0  # a screen of 60 Hz, and half a picture until it is next drawn
 
 
 def add_mode_arguments(parser: argparse.ArgumentParser, *, recording: bool = False) -> None:
@@ -79,15 +80,16 @@ def add_head_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--predictor",
         choices=tuple(PREDICTORS),
-        default="hold",
-        help="how the head is expected to go on (default hold: not at all)",
+        default=DEFAULT,
+        help=f"how the head is expected to go on (default {DEFAULT}; hold: not at all)",
     )
     parser.add_argument(
         "--ahead",
         type=float,
-        default=0.0,
+        default=AHEAD_MS,
         metavar="MS",
-        help="expect it for so long after now: the way from here to the eye, 0 to 500",
+        help="expect it for so long after now: the way from here to the eye, 0 to 500 "
+        f"(default {AHEAD_MS:g})",
     )
 
 

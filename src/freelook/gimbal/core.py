@@ -44,7 +44,7 @@ from .stabiliser import BODY, Base, Stabiliser
 
 CENTRE: Rotation = FRD_FROM_RDF
 LEAST_JUMP_DEG = 15.0  # less than this in no time is noise, or poses that came in a heap
-LONGEST_PREDICTION_S = 0.1  # after the newest pose; then the prediction is held
+LONGEST_PREDICTION_S = 0.2  # after the newest pose; then the prediction is held
 FORWARD_STATES = ("easing", "centred", "disabled", "front")
 
 

@@ -4,6 +4,8 @@
 of that path. `inputs=x,y,z` are its axes for yaw, pitch and roll (`-`: none), by the kernel's names
 without ABS_; `span` is the angle in degrees at their ends. The axes' present values are asked for
 `rate` times a second, so that a head that keeps still is not taken for a tracker that fell silent.
+`buttons=a,b,c` recentre, switch off and on, and bring eyes front, by the kernel's names without
+BTN_ (`-`: none).
 
 On radios pitch grows with its channel; on gamepads y grows downwards: there add `pitch=-pitch`.
 """
@@ -13,7 +15,7 @@ from __future__ import annotations
 import errno
 import os
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from scipy.spatial.transform import Rotation
@@ -30,7 +32,9 @@ if TYPE_CHECKING:
     from evdev import InputDevice
 
 KIND = "joystick"
-OPTIONS = ("inputs", "span", "rate")
+OPTIONS = ("inputs", "span", "rate", "buttons")
+ACTIONS = ("recentre", "toggle", "eyes_front")
+DEFAULT_BUTTONS = "south,east,west"
 AXES = AxisMap()
 DEFAULT_INPUTS = "x,y,z"
 DEFAULT_RATE_HZ = 250.0
@@ -47,10 +51,11 @@ def open(argument: str, *, axes: AxisMap, options: Mapping[str, str], clock: Clo
             "it works on Linux only; elsewhere use the page, which reads gamepads itself"
         )
     inputs = parse_inputs(options.get("inputs", DEFAULT_INPUTS))
+    buttons = parse_buttons(options.get("buttons", DEFAULT_BUTTONS))
     if not argument:
         here = ", ".join(names_here()) or "none that this user may read (is it in group 'input'?)"
         raise TrackerError(f"which device? write joystick:PART_OF_ITS_NAME; here: {here}")
-    return Joystick(AxisSampler(argument, inputs, span_deg, axes), rate_hz, clock)
+    return Joystick(AxisSampler(argument, inputs, span_deg, axes, buttons), rate_hz, clock)
 
 
 def parse_inputs(text: str) -> tuple[int | None, ...]:
@@ -72,12 +77,45 @@ def parse_inputs(text: str) -> tuple[int | None, ...]:
     return tuple(known.get(name) for name in names)
 
 
+def parse_buttons(text: str) -> dict[int, str]:
+    """Which action (of ACTIONS) belongs to which of the kernel's buttons. TrackerError for unknown
+    names."""
+    from evdev import ecodes
+
+    names = text.lower().split(",")
+    numbers = [ecodes.ecodes.get(f"BTN_{name.upper()}") for name in names]
+    unknown = [
+        name for name, number in zip(names, numbers, strict=True) if name != SKIP and number is None
+    ]
+    if len(names) != len(ACTIONS) or unknown:
+        raise TrackerError(
+            f"buttons={text} must be three buttons, to recentre, switch off and on, and bring eyes "
+            f"front, such as {DEFAULT_BUTTONS} or trigger,thumb,thumb2, and {SKIP} for none"
+        )
+    return {
+        number: action
+        for number, action in zip(numbers, ACTIONS, strict=True)
+        if number is not None
+    }
+
+
 class Joystick(PolledTracker):
-    """The sampler on the clock; lets go of the device at the end."""
+    """The sampler on the clock; lets go of the device at the end.
+
+    `on_action`, if set, hears what buttons ask for (ACTIONS), on the tracker's thread.
+    """
 
     def __init__(self, sampler: AxisSampler, rate_hz: float, clock: Clock) -> None:
         super().__init__(sampler, rate_hz, clock)
         self._axis_sampler = sampler
+
+    @property
+    def on_action(self) -> Callable[[str], None] | None:
+        return self._axis_sampler.on_action
+
+    @on_action.setter
+    def on_action(self, hear: Callable[[str], None] | None) -> None:
+        self._axis_sampler.on_action = hear
 
     def poses(self) -> Iterator[Pose]:
         try:
@@ -90,9 +128,17 @@ class AxisSampler:
     """Asks a device where its axes are; looks for it once a second while it is not there."""
 
     def __init__(
-        self, wanted: str, inputs: tuple[int | None, ...], span_deg: float, axes: AxisMap
+        self,
+        wanted: str,
+        inputs: tuple[int | None, ...],
+        span_deg: float,
+        axes: AxisMap,
+        buttons: Mapping[int, str] | None = None,
     ) -> None:
         self.counters = Counters()
+        self.on_action: Callable[[str], None] | None = None
+        self._buttons = buttons or {}
+        self._pressed: set[int] | None = None
         self._wanted = wanted
         self._inputs = inputs
         self._span_deg = span_deg
@@ -113,12 +159,23 @@ class AxisSampler:
             if device is None:
                 return None
             angles = [self._angle_deg(device, number) for number in self._inputs]
+            self._press(device)
         except (OSError, ValueError) as error:  # ValueError: text that cannot be a path
             self._lose(error)
             return None
         return self._axes.body_from_view(*angles)
 
+    def _press(self, device: InputDevice[str]) -> None:
+        """Tell what was pressed since the last look; not what was held when we came."""
+        if self.on_action is None or not self._buttons:
+            return
+        pressed = set(device.active_keys()) & set(self._buttons)
+        for number in sorted(pressed - (pressed if self._pressed is None else self._pressed)):
+            self.on_action(self._buttons[number])
+        self._pressed = pressed
+
     def let_go(self) -> None:
+        self._pressed = None
         if self._device is not None:
             self._device.close()
         self._device = None
