@@ -25,6 +25,7 @@ from .views import View
 
 FOLDS = 5
 NEARLY = 1e-3  # of the squared distances: so far they may be from what the step said
+STEPS, ENOUGH = 15, 1e-5  # anew: along flat valleys nothing changes what is predicted
 NO_DAMPING = 1e-12
 
 Bools = NDArray[np.bool_]
@@ -66,6 +67,8 @@ def _solved_from(
         freedom,
         robust=False,
         counted=[solution.inliers[i] for i in kept],
+        steps=STEPS,
+        enough=ENOUGH,
     ).camera
 
 
