@@ -176,6 +176,16 @@ def test_the_vehicles_turning_is_taken_out_of_the_hands_view() -> None:
     assert angles(pilot, newest_ns) == pytest.approx((0, 0, 0), abs=0.01)
 
 
+def test_m_goes_round_the_modes_that_are_possible() -> None:
+    stabiliser = Stabiliser()
+    pilot = Pilot({}, 90.0, stabiliser)
+    seen = []
+    for _ in range(5):
+        pilot.take([Key("m", True), Key("m", False)], 1, SIZE)
+        seen.append(stabiliser.mode)
+    assert seen == ["horizon", "world", "follow", "body", "horizon"]
+
+
 def test_zooming_leaves_control_where_it_is() -> None:
     pilot, _ = tracked()
     pilot.take([Wheel(2)], 3000, SIZE)
@@ -188,7 +198,7 @@ def test_recentre_and_eyes_front_of_a_tracker() -> None:
     straight = body_from_view(0, 0)
     assert angle_between_deg(pilot.look(LATER_NS).body_from_view, straight) < 1e-6
     pilot.take([Key("e", True)], LATER_NS, SIZE)
-    assert head.aim(LATER_NS).state == "disabled"
+    assert head.aim(LATER_NS).state == "front"
     pilot.take([Key("e", True)], LATER_NS, SIZE)
     assert head.aim(LATER_NS).state == "tracking"
 

@@ -20,11 +20,12 @@ from ._stabilising import vehicle_for
 
 if TYPE_CHECKING:
     from ..ingest import Ingest
+    from ..vehicle import Vehicle
     from ..window.ages import Figures
 
 EYES = ("mono", "side-by-side", "top-bottom")
 KEYS = (
-    "drag or arrows look, wheel or + and - zoom, R recentres, E eyes front and back, "
+    "drag or arrows look, wheel or + and - zoom, R recentres, E eyes front and back, M mode, "
     "G gives the tracker control again, F full screen, Q or Esc ends"
 )
 
@@ -93,7 +94,8 @@ def fly_in_window(args: argparse.Namespace, ingest: Ingest, camera: Camera) -> N
         for head in heads.values():
             head.start()
         line = opened.enter_context(StatusLine())
-        outside = Outside(now_ns, opened.enter_context(asked_to_stop()), _report(ingest, line))
+        report = _report(ingest, vehicle, line)
+        outside = Outside(now_ns, opened.enter_context(asked_to_stop()), report)
         pilot = Pilot(heads, args.hfov, vehicle.stabiliser)
         limit = LensLimit(camera) if args.limit == "soft" else None
         flight = Flight(surface, frames, camera, pilot, outside, optics, args.sampling, limit)
@@ -101,12 +103,14 @@ def fly_in_window(args: argparse.Namespace, ingest: Ingest, camera: Camera) -> N
         flight.run()
 
 
-def _report(ingest: Ingest, line: StatusLine) -> Callable[[int], float]:
-    """Says how the source is; the picture greys while it is lost."""
+def _report(ingest: Ingest, vehicle: Vehicle, line: StatusLine) -> Callable[[int], float]:
+    """Says how the source and the mode are; the picture greys while the source is lost."""
 
     def grey(at_ns: int) -> float:
         status = ingest.status(at_ns)
-        line.show("; ".join(filter(None, (f"source: {status.state}", status.message))))
+        mode = vehicle.status()
+        parts = [f"source: {status.state}", status.message, f"mode: {mode.mode}", mode.message]
+        line.show("; ".join(filter(None, parts)))
         return 1.0 if status.state == "lost" else 0.0
 
     return grey

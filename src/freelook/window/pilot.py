@@ -13,7 +13,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..clock import NS_PER_S
-from ..gimbal import Stabiliser
+from ..errors import TrackerError
+from ..gimbal import MODES, Stabiliser
 from ..head import Head
 from ..rotations import body_from_view, head_angles_deg
 from ..viewport import NARROWEST_DEG, WIDEST_DEG, Viewport
@@ -126,7 +127,15 @@ class Pilot:
         self._enabled = not self._enabled
         self._hand_ns = now_ns
         for head in self._heads.values():
-            (head.enable if self._enabled else head.disable)(now_ns)
+            (head.enable if self._enabled else head.eyes_front)(now_ns)
+
+    def next_mode(self) -> None:
+        """Of what is taken out of the view; *point* only where there is something to point at."""
+        after = MODES.index(self._stabiliser.mode) + 1
+        try:
+            self._stabiliser.set_mode(MODES[after % len(MODES)])
+        except TrackerError:
+            self._stabiliser.set_mode(MODES[0])
 
     def give_back(self) -> None:
         """To the tracker that had control before anything was touched, if there is one."""
@@ -146,6 +155,8 @@ class Pilot:
             self.recentre(now_ns)
         elif key.name == "e":
             self.toggle(now_ns)
+        elif key.name == "m":
+            self.next_mode()
         elif key.name == "g":
             self.give_back()
         return {"f": ["full screen"], "q": ["quit"], "escape": ["quit"]}.get(key.name, [])
