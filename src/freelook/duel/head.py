@@ -22,6 +22,7 @@ COLUMNS = ("timestamp", "w", "x", "y", "z")
 LEAST_STEP_NS = 1_000_000
 SYNTHETIC_SECONDS = 60.0
 TURNS = 12
+TURN_DEG = 60.0
 
 # recordings: x forward, y left, z up, for the head and for the room
 _FRD_FROM_FLU = Rotation.from_quat([1.0, 0.0, 0.0, 0.0])
@@ -171,10 +172,10 @@ def synthetic_head(seconds: float = SYNTHETIC_SECONDS, seed: int = 2011) -> Head
     return HeadMotion("synthetic head", np.rint(times * NS_PER_S).astype(np.int64), poses)
 
 
-def turns_head(count: int = TURNS, size_deg: float = 60.0, turn_s: float = 0.4) -> HeadMotion:
-    """Turns of the head to and fro about the vertical, one every 1.6 s and a bit, so that they
-    meet every clock at every phase. The profile is that of minimum jerk: Hogan (1984)."""
-    times = np.arange(0, round(count * 163 + 100)) / 100.0
+def turns_head(count: int = TURNS, size_deg: float = TURN_DEG, turn_s: float = 0.4) -> HeadMotion:
+    """Turns of the head to and fro about the vertical, one about every 1.6 s, so that they meet
+    every clock at other phases. The profile is that of `minimum_jerk`."""
+    times = np.arange(0, count * 160 + 200) / 100.0
     yaw = np.zeros(len(times))
     for number, start_s in enumerate(turn_starts_s(count)):
         step = size_deg if number % 2 == 0 else -size_deg
@@ -184,8 +185,10 @@ def turns_head(count: int = TURNS, size_deg: float = 60.0, turn_s: float = 0.4) 
 
 
 def turn_starts_s(count: int = TURNS) -> Floats:
-    """When the turns of `turns_head` begin: on its 10 ms grid, at ever other fractions of 16 ms."""
-    return np.round(1.0 + np.arange(count) * 1.61, 2)
+    """When the turns of `turns_head` begin, in seconds: the golden ratio keeps them from falling
+    into step with any clock."""
+    number = np.arange(count)
+    return np.asarray(1.0 + 1.6 * number + 0.1 * (number * 0.6180339887 % 1.0))
 
 
 def minimum_jerk(fraction: Floats) -> Floats:

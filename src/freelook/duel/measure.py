@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from ..clock import NS_PER_MS, NS_PER_S
 from .chains import Shown
-from .head import HeadMotion, turn_starts_s
+from .head import TURN_DEG, HeadMotion, turn_starts_s
 from .stages import Times
 
 Floats = NDArray[np.float64]
@@ -95,7 +95,7 @@ def lag_ms(head: HeadMotion, shown: Shown, t_ns: Times) -> float:
     return best + (0.5 * (before - after) / bend if bend < 0 else 0.0)
 
 
-def turn_delays_ms(head: HeadMotion, shown: Shown, size_deg: float = 60.0) -> Floats:
+def turn_delays_ms(head: HeadMotion, shown: Shown, size_deg: float = TURN_DEG) -> Floats:
     """(turns, 3): how much later than the head the view has 10, 50 and 90 % of each turn of
     `freelook.duel.head.turns_head`; infinite where it has not before the next turn."""
     starts = np.rint(turn_starts_s() * NS_PER_S).astype(np.int64)

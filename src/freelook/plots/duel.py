@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from ..clock import NS_PER_MS, NS_PER_S
 from ..duel.chains import Shown
 from ..duel.contest import Duel
-from ..duel.head import HeadMotion, turn_starts_s
+from ..duel.head import TURN_DEG, HeadMotion, turn_starts_s
 from ..duel.measure import yaw_deg
 from ..lens import Floats
 from ._style import BLUE, INK, ORANGE, new_figure, panel, style
@@ -78,21 +78,27 @@ def draw_distribution(axes: Axes, errors: dict[str, Floats]) -> None:
 
 
 def draw_turn(axes: Axes, turns: HeadMotion, turned: dict[str, Shown]) -> None:
-    """The median of all turns to the right, and where 9 of 10 of them lie."""
+    """The median of all turns, those to the left turned over, and where 9 of 10 of them lie."""
     panel(
         axes,
-        "A turn of 60° in 0.4 s, at every phase",
+        "A turn of 60° in 0.4 s, twelve times",
         "time since it began, ms",
         "azimuth, degrees",
     )
     since_ms = np.arange(-50, 700, 2)
-    starts = np.rint(turn_starts_s()[::2] * NS_PER_S).astype(np.int64)
+    starts = np.rint(turn_starts_s() * NS_PER_S).astype(np.int64)
     t_ns = (starts[:, None] + since_ms * NS_PER_MS).ravel()
-    looks = yaw_deg(turns.at(t_ns)).reshape(len(starts), -1)
+    looks = _all_to_the_right(yaw_deg(turns.at(t_ns)).reshape(len(starts), -1))
     axes.plot(since_ms, np.median(looks, axis=0), color=INK, label="head", linewidth=1.2)
     for name, shown in turned.items():
-        sees = yaw_deg(shown.at(t_ns)).reshape(len(starts), -1)
+        sees = _all_to_the_right(yaw_deg(shown.at(t_ns)).reshape(len(starts), -1))
         low, middle, high = np.percentile(sees, [5, 50, 95], axis=0)
         axes.fill_between(since_ms, low, high, color=COLOR_OF[name], alpha=0.2, linewidth=0)
         axes.plot(since_ms, middle, color=COLOR_OF[name], label=name)
     axes.legend(loc="upper left")
+
+
+def _all_to_the_right(yaws_deg: Floats) -> Floats:
+    """Every other turn goes back."""
+    yaws_deg[1::2] = TURN_DEG - yaws_deg[1::2]
+    return yaws_deg
