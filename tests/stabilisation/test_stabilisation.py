@@ -199,6 +199,13 @@ def test_where_the_attitude_is_unknown_the_view_is_the_vehicle_s() -> None:
     assert steps.max() < 20 * 2 * np.pi * 0.5 / 30 + 20 / 15  # its own motion, and the easing
 
 
+def test_a_log_that_ends_with_the_last_frame_is_enough() -> None:
+    track = rolling(20, 2)
+    aim = SmoothAim(Flight(track, 0, 40), ahead, fisheye(), VIEW, 0.3)
+    assert aim.unknown == 0
+    assert aim.limited == 0
+
+
 def test_a_log_of_another_time_is_refused() -> None:
     flight = Flight(rolling(1, 1), -100 * 10**9, 20)
     with pytest.raises(AttitudeError, match=r"begins at -100\.000 s of it"):

@@ -27,6 +27,7 @@ from .containment import Containment, eased, widest_hfov_deg
 from .smoothing import DEFAULT_HZ, smoothed
 
 EASE_S = 0.5  # to both sides, for which a fraction changes before and after what limits it
+HELD_S = 0.1  # for so long before and after the log its ends are held
 STEP_NS = NS_PER_S // 30
 
 Look = Callable[[int], Rotation]
@@ -70,7 +71,7 @@ class SmoothAim:
         self._look = look
         self._path = smoothed(flight.track, cutoff_hz)
         steps = flight.steps()
-        known = flight.track.known(steps + flight.zero_ns)
+        known = _known(flight.track, steps + flight.zero_ns)
         if not known.any():
             raise AttitudeError(
                 f"the log lasts from {_s(flight.track.times_ns[0])} to "
@@ -111,6 +112,13 @@ class SmoothAim:
                 f"stabilised, which leaves no room to smooth it; {advice}"
             )
         return containment.largest_fractions(raw, self._steady(steps, raw))
+
+
+def _known(track: AttitudeTrack, times_ns: Times) -> NDArray[np.bool_]:
+    """Where there is an attitude; a log that ends with the last frame ends soon enough."""
+    nearest = np.clip(times_ns, track.times_ns[0], track.times_ns[-1])
+    near = np.abs(times_ns - nearest) <= HELD_S * NS_PER_S
+    return track.known(nearest) & near
 
 
 def _s(t_ns: int) -> str:
