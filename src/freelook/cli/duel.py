@@ -7,7 +7,8 @@ the video that has arrived, and a gimbal's, whose motors turn the camera itself.
 
 Told are the angle between where the head looks and what it is shown at that time (median, 95th
 and 99th percentile), the lag by cross-correlation, how late a turn of 60 degrees is shown, and how
-old the picture is: there freelook wins nothing, the video link is the same.
+old the picture is. There freelook wins nothing: the link is the same, the way into a computer
+longer.
 
   freelook duel
   freelook duel user1.txt user2.txt --gimbal hobby-servo --link analogue --out duel
