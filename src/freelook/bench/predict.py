@@ -32,10 +32,10 @@ PERCENTS = (50, 95, 99)
 COLUMNS = ("timestamp", "w", "x", "y", "z")
 LARGEST_BYTES = 200_000_000
 
-STILL_SECONDS = 20.0
+STILL_SECONDS = 11.0
 STILL_RATE_HZ = 60.0
 STILL_NOISE_DEG = 0.02  # per axis, rms: a good inertial tracker at rest
-STEADY_SECONDS = 3.0
+STEADY_SECONDS = 2.0
 SPEEDS_DEG_S = (1.0, 2.0, 5.0, 10.0, 20.0, 100.0)
 
 # The recordings have x forward and z up, in the world as in the head.
@@ -140,23 +140,28 @@ def rows(
         yield Row(recording.name, name, horizon_ms, shares, len(error))
 
 
-def jitter_at_rest_deg(name: str, horizon_ms: float, seed: int = 2011) -> float:
+def jitter_at_rest_deg(name: str, seed: int = 2011) -> dict[float, float]:
     """RMS angle by which predictions shake about their mean while the head does not move.
 
-    The tracker's noise is white, `STILL_NOISE_DEG` about each axis, at `STILL_RATE_HZ`; the first
-    second is left out.
+    For each of `HORIZONS_MS`. The tracker's noise is white, `STILL_NOISE_DEG` about each axis, at
+    `STILL_RATE_HZ`; the first second is left out.
     """
     rng = np.random.default_rng(seed)
     count = round(STILL_SECONDS * STILL_RATE_HZ)
     noise = np.radians(STILL_NOISE_DEG) * rng.standard_normal((count, 3))
     poses = body_from_view(100.0, -20.0, 5.0) * Rotation.from_rotvec(noise)
     predictor = make_predictor(name)
-    said = []
+    said: dict[float, list[Rotation]] = {ahead_ms: [] for ahead_ms in HORIZONS_MS}
     for index in range(count):
         t_ns = round(index * NS_PER_S / STILL_RATE_HZ)
         predictor.push(Pose(poses[index], t_ns))
-        said.append(predictor.at(t_ns + round(horizon_ms * NS_PER_MS)))
-    turns = Rotation.concatenate(said[round(STILL_RATE_HZ) :])
+        for ahead_ms, turns in said.items():
+            turns.append(predictor.at(t_ns + round(ahead_ms * NS_PER_MS)))
+    first = round(STILL_RATE_HZ)
+    return {ahead: _shaking_deg(Rotation.concatenate(said[ahead][first:])) for ahead in said}
+
+
+def _shaking_deg(turns: Rotation) -> float:
     return float(np.degrees(np.sqrt(np.mean((turns.mean().inv() * turns).magnitude() ** 2))))
 
 

@@ -38,9 +38,7 @@ def run(args: argparse.Namespace) -> int:
             for name in PREDICTORS:
                 found += predict.rows(recording, name, advance)
     jitter = {
-        name: {
-            f"{ahead:g}": predict.jitter_at_rest_deg(name, ahead) for ahead in predict.HORIZONS_MS
-        }
+        name: {f"{ahead:g}": deg for ahead, deg in predict.jitter_at_rest_deg(name).items()}
         for name in PREDICTORS
     }
     lag = {

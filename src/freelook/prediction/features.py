@@ -60,10 +60,10 @@ def features(history: PoseHistory) -> Features | None:
     steps_s = _steps(knots_s)
     in_plane = rates @ axes[:2].T / speed
     knots_in_plane = knot_rates @ axes[:2].T / speed
-    inputs = [
+    inputs: list[Floats] = [
         in_plane.T.ravel(),
         knots_in_plane.ravel(),
-        [np.log(speed) - 3.5],
+        np.array([np.log(speed) - 3.5]),
         (steps_s[:STEPS] - USUAL_STEP_S) * 200.0,
         # the same rates if the tracker's steps had been of one length
         (knots_in_plane * (steps_s / USUAL_STEP_S)[:, None]).ravel(),
