@@ -107,6 +107,16 @@ def test_without_a_source_only_body_mode_is_without_complaint() -> None:
     vehicle.close()
 
 
+def test_what_a_source_finds_of_its_time_is_told() -> None:
+    source = _FindsItsTime([])
+    assert Vehicle(Stabiliser(), source).status().offset == "3 ms late"
+    assert Vehicle(Stabiliser(), ScriptedAttitude([])).status().offset == ""
+
+
+class _FindsItsTime(ScriptedAttitude):
+    report = "3 ms late"
+
+
 def test_eyes_front_and_jumps_reach_the_heads_status() -> None:
     gimbal = Gimbal()
     head = Head("test", _NoTracker(), gimbal)

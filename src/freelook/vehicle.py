@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
 from .gimbal import Base, Stabiliser
 from .types import Attitude, AttitudeSource
@@ -15,7 +16,8 @@ class VehicleStatus:
     """What there is to say about the vehicle's attitude.
 
     `mode`, `effective` and `state` are the stabiliser's (`freelook.gimbal.Base`); `message` says
-    what is wrong, if anything. `received` counts attitudes.
+    what is wrong, if anything. `received` counts attitudes. `offset` is what there is to say of
+    the attitude's time beside the video's, where that is found while flying.
     """
 
     mode: str
@@ -24,6 +26,15 @@ class VehicleStatus:
     message: str
     received: int
     counters: dict[str, int]
+    offset: str = ""
+
+
+@runtime_checkable
+class FindsItsTime(Protocol):
+    """A source such as `freelook.offset_finder.OffsetFinder`."""
+
+    @property
+    def report(self) -> str: ...
 
 
 class Vehicle:
@@ -58,7 +69,10 @@ class Vehicle:
         mode = self.stabiliser.mode
         counters = dict(self._source.counters.values) if self._source else {}
         message = self._explain(base) if mode != "body" else ""
-        return VehicleStatus(mode, base.effective, base.state, message, self._received, counters)
+        offset = self._source.report if isinstance(self._source, FindsItsTime) else ""
+        return VehicleStatus(
+            mode, base.effective, base.state, message, self._received, counters, offset
+        )
 
     def _explain(self, base: Base) -> str:
         if self._source is None:

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import argparse
+import os
 from typing import TYPE_CHECKING
 
 from ..attitude import AttitudeBuffer
 from ..attitude_track import AttitudeTrack
+from ..camera import Camera
 from ..clock import NS_PER_S
 from ..errors import AttitudeError
 from ..gimbal import LIMITS, MODES, GimbalSettings, Stabiliser, parse_shape, parse_target
 from ..prediction import DEFAULT, PREDICTORS
 from ..types import AccessUnit, Attitude
 from ..vehicle import Vehicle
-from ._recording_time import seconds_or_auto
+from ._recording_time import recording_offset_s, seconds_or_auto
 
 if TYPE_CHECKING:  # slow to load, and may be missing
     from ..attitudes._log import LogSource
@@ -23,7 +25,7 @@ WHOLE_LOG_S = 1e9
 AHEAD_MS = 20.0  # a screen of 60 Hz, and half a picture until it is next drawn
 
 
-def add_mode_arguments(parser: argparse.ArgumentParser, *, recording: bool = False) -> None:
+def add_mode_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--mode",
         choices=MODES,
@@ -39,12 +41,10 @@ def add_mode_arguments(parser: argparse.ArgumentParser, *, recording: bool = Fal
     )
     parser.add_argument(
         "--attitude-offset",
-        type=seconds_or_auto if recording else float,
+        type=seconds_or_auto,
         metavar="S",
-        help="attitude time minus video time in seconds: a log's time at the first picture "
-        "(default: found from what both have seen of the vehicle's turning)"
-        if recording
-        else "attitude time minus video time in seconds (default 0)",
+        help="attitude time minus video time in seconds: of a log, its time at the first picture "
+        "(default: found from what both have seen of the vehicle's turning)",
     )
     parser.add_argument(
         "--point",
@@ -119,15 +119,33 @@ def stabiliser_for(args: argparse.Namespace, buffer: AttitudeBuffer | None = Non
     return stabiliser
 
 
-def vehicle_for(args: argparse.Namespace, ingest: Ingest) -> Vehicle:
-    """For flying: a live source is read as it comes. A log is known from the beginning, and
-    belongs to a recording: its times are told from the recording's own."""
+def vehicle_for(args: argparse.Namespace, ingest: Ingest, camera: Camera) -> Vehicle:
+    """For flying. A live source is read as it comes, and its time beside the video's is found by
+    itself unless it was told. A log is known from the beginning, and belongs to a recording: its
+    times are told from the recording's own."""
     from ..attitudes import open_attitude
     from ..attitudes._log import LogSource
 
+    check_mode(args)
     source = None if args.attitude is None else open_attitude(args.attitude)
-    if not isinstance(source, LogSource):
-        return Vehicle(stabiliser_for(args), source)
+    if isinstance(source, LogSource):
+        return _vehicle_of_recording(args, ingest, camera, source)
+    stabiliser = stabiliser_for(args)
+    if source is None or args.attitude_offset is not None:
+        return Vehicle(stabiliser, source)
+    from ..offset_finder import OffsetFinder
+
+    finder = OffsetFinder(source, camera, ingest.frames(), stabiliser.set_offset)
+    return Vehicle(stabiliser, finder)
+
+
+def _vehicle_of_recording(
+    args: argparse.Namespace, ingest: Ingest, camera: Camera, source: LogSource
+) -> Vehicle:
+    recording = getattr(args, "source", "")
+    if args.attitude_offset is None and os.path.isfile(recording):
+        of_recording = argparse.Namespace(**{**vars(args), "input": recording})
+        args.attitude_offset = recording_offset_s(of_recording, camera, source.track)
     stabiliser = stabiliser_for(args, AttitudeBuffer(span_s=WHOLE_LOG_S))
     _push_log(stabiliser, source)
     offset_ns = stabiliser.offset_ns

@@ -79,7 +79,7 @@ def fly_in_window(args: argparse.Namespace, ingest: Ingest, camera: Camera) -> N
     from .fly import gimbal_for, open_heads
 
     optics = Optics(args.eyes, args.eye_offset, args.viewer_lens)
-    vehicle = vehicle_for(args, ingest)
+    vehicle = vehicle_for(args, ingest, camera)
     with contextlib.ExitStack() as opened:
         surface = opened.enter_context(Surface(args.window_size, args.monitor, not args.no_vsync))
         say(f"window: drawn by {surface.renderer}")

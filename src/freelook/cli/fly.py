@@ -158,7 +158,7 @@ def fly(
 
     Viewport((16, 9), about.hfov_deg)  # these two say what is wrong with them
     gimbal_settings(args)
-    vehicle = vehicle_for(args, ingest)
+    vehicle = vehicle_for(args, ingest, camera)
     with contextlib.ExitStack() as opened, StatusLine() as line:
         gimbal = partial(gimbal_for, args, vehicle.stabiliser)
         heads = open_heads(args.tracker, gimbal, opened)
@@ -238,6 +238,9 @@ def summary(station: Station, explain: Callable[[str], str]) -> str:
     message = explain(source["state"]) or source["message"]
     parts += [message, source["transcoding"] and f"transcoding: {source['transcoding']}"]
     parts += [f"{t['name']} {t['state']}" for t in status["trackers"]]
+    vehicle = status["vehicle"]
+    if vehicle["mode"] != "body":
+        parts += [f"mode {vehicle['mode']}", vehicle["message"], vehicle["offset"]]
     viewers = status["viewers"]
     parts.append(f"{viewers} viewer{'' if viewers == 1 else 's'}")
     return "; ".join(filter(None, parts))

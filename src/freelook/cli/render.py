@@ -56,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--size", type=size, default=(1280, 720), metavar="WxH", help="of the view (1280x720)"
     )
-    add_mode_arguments(parser, recording=True)
+    add_mode_arguments(parser)
     add_stabilize_arguments(parser)
     add_renderer_arguments(parser)
     parser.add_argument("--overwrite", action="store_true", help="replace OUT if it exists")

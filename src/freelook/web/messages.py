@@ -96,6 +96,7 @@ def status(
             "message": vehicle.message,
             "received": vehicle.received,
             "counters": vehicle.counters,
+            "offset": vehicle.offset,
         }
     return message
 
