@@ -36,22 +36,24 @@ def ulog(topic: str, fields: str, times_us: NDArray[np.int64], values: Floats) -
     return b"".join(text)
 
 
-def dataflash(name: str, columns: str, types: str, rows: Sequence[tuple[float, ...]]) -> bytes:
+def dataflash(
+    name: str, columns: str, types: str, rows: Sequence[tuple[float, ...]], number: int = 200
+) -> bytes:
     """One message of ArduPilot's: `types` are the letters of its format (Q, f, c, C, B)."""
     packing = {"Q": "Q", "f": "f", "c": "h", "C": "H", "B": "B", "h": "h"}
     layout = "<" + "".join(packing[letter] for letter in types)
     text = []
-    for number, length, label, form, names in (
+    for code, length, label, form, names in (
         (128, 89, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns"),
-        (200, 3 + struct.calcsize(layout), name, types, columns),
+        (number, 3 + struct.calcsize(layout), name, types, columns),
     ):
         body = struct.pack(
-            "<BB4s16s64s", number, length, label.encode(), form.encode(), names.encode()
+            "<BB4s16s64s", code, length, label.encode(), form.encode(), names.encode()
         )
         text.append(b"\xa3\x95\x80" + body)
     for row in rows:
         whole = [v if t == "f" else round(v) for v, t in zip(row, types, strict=True)]
-        text.append(b"\xa3\x95" + bytes([200]) + struct.pack(layout, *whole))
+        text.append(b"\xa3\x95" + bytes([number]) + struct.pack(layout, *whole))
     return b"".join(text)
 
 

@@ -55,6 +55,7 @@ def csv_text(header: str, times: np.ndarray, values: np.ndarray) -> str:
         ("t_s,qw,qx,qy,qz", 1e-6),
         ("t_s, qw, qx, qy, qz (FRD body -> NED)", 1e-6),
         ("timestamp,q[0],q[1],q[2],q[3]", 1),
+        ("timestamp_sample,q[0],q[1],q[2],q[3]", 1),
     ],
 )
 def test_csv_with_quaternions(tmp_path: Path, header: str, scale: float) -> None:
@@ -156,6 +157,25 @@ def test_dataflash_with_angles(tmp_path: Path) -> None:
     log = attitude_logs.dataflash("ATT", "TimeUS,Roll,Pitch,Yaw", "QccC", rows)
     # two angles rounded to hundredths
     assert largest_error_deg(opened(tmp_path / "a.bin", log)) < 0.008
+
+
+def test_dataflash_takes_what_was_logged_most_often(tmp_path: Path) -> None:
+    pytest.importorskip("pymavlink")
+    yaw, pitch, roll = TURNS.as_euler("ZYX", degrees=True).T
+    columns = (TIMES_US.tolist(), roll, pitch, yaw % 360)
+    angles = [(t, r * 100, p * 100, y * 100) for t, r, p, y in zip(*columns, strict=True)]
+    rare = [(t, 0, *q) for t, q in zip(TIMES_US.tolist()[::5], WXYZ.tolist()[::5], strict=True)]
+    log = attitude_logs.dataflash("ATT", "TimeUS,Roll,Pitch,Yaw", "QccC", angles)
+    log += attitude_logs.dataflash("XKQ", "TimeUS,C,Q1,Q2,Q3,Q4", "QBffff", rare, number=201)
+    assert largest_error_deg(opened(tmp_path / "a.bin", log)) < 0.008
+
+
+def test_dataflash_without_attitude_says_so(tmp_path: Path) -> None:
+    pytest.importorskip("pymavlink")
+    rows = [(t, 1.0) for t in TIMES_US.tolist()]
+    log = attitude_logs.dataflash("BARO", "TimeUS,Alt", "Qf", rows)
+    with pytest.raises(AttitudeError, match="none of ATT, VSTB"):
+        opened(tmp_path / "a.bin", log)
 
 
 @pytest.mark.parametrize("name", ["a.ulg", "a.bin", "a.log", "a.gcsv", "a.mp4"])

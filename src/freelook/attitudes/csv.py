@@ -1,6 +1,7 @@
 """A CSV file: `log.csv` with a header; quaternions, angles, or a gyroscope's rates.
 
-Time is `t_s` in seconds, or `timestamp` in microseconds (as PX4's `ulog2csv` writes). Then one of
+Time is `t_s` in seconds, or `timestamp_sample`, else `timestamp`, in microseconds (as PX4's
+`ulog2csv` writes). Then one of
 
     qw,qx,qy,qz  or  q[0],q[1],q[2],q[3]        body (forward, right, down) to north, east, down
     roll_deg,pitch_deg,yaw_deg                  yaw about down, then pitch up, then roll right
@@ -27,7 +28,7 @@ KIND = "csv"
 OPTIONS: tuple[str, ...] = ()
 
 Floats = NDArray[np.float64]
-TIMES = {"t_s": 1.0, "timestamp": 1e-6}
+TIMES = {"t_s": 1.0, "timestamp_sample": 1e-6, "timestamp": 1e-6}  # the first there is
 QUATERNIONS = (("qw", "qx", "qy", "qz"), ("q[0]", "q[1]", "q[2]", "q[3]"))
 ANGLES = (("roll_deg", "pitch_deg", "yaw_deg"),)
 RATES = (("gx", "gy", "gz"), ("gyro_rad[0]", "gyro_rad[1]", "gyro_rad[2]"))

@@ -1,7 +1,7 @@
 """ArduPilot's log: `flight.bin` or `flight.log`, the autopilot's own attitude (ATT).
 
-Where the log has quaternions of the estimator in use (XKQ, NKQ1 or VSTB) they are taken, else the
-angles of ATT, which are rounded to hundredths of a degree. Times are microseconds since boot. Read
+Beside the angles of ATT, rounded to hundredths of a degree, a log may have quaternions (VSTB, XKQ,
+NKQ, NKQ1); what was logged most often is taken. Times are microseconds since boot. Read
 with pymavlink, ArduPilot's own.
 """
 
@@ -23,8 +23,8 @@ KIND = "dataflash"
 OPTIONS: tuple[str, ...] = ()
 BINARY, TEXT = b"\xa3\x95\x80", b"FMT"  # how the two kinds of file begin
 ANGLES = "ATT"
-# as logged by EKF3, EKF2 and the fast stabilisation log; the first there is counts
-QUATERNIONS = ("XKQ", "VSTB", "NKQ1", "NKQ")
+# of the fast log for stabilising video, of EKF3, of EKF2
+QUATERNIONS = ("VSTB", "XKQ", "NKQ", "NKQ1")
 
 
 def recognises(argument: str) -> bool:
@@ -54,12 +54,14 @@ def open(argument: str, *, options: Mapping[str, str], clock: Clock) -> LogSourc
     finally:
         if hasattr(reader, "filehandle"):
             reader.filehandle.close()  # the mapping goes with the reader
-    for kind in (*QUATERNIONS, ANGLES):
-        if rows := messages.get(kind):
-            times_us, *values = np.array(rows, float).T
-            times_ns = np.round(times_us * 1000).astype(np.int64)
-            return log_of_quaternions(argument, times_ns, np.stack(values, axis=-1))
-    raise AttitudeError(f"{argument}: none of {', '.join(QUATERNIONS)} and {ANGLES} was logged")
+    if not messages:
+        known = ", ".join((ANGLES, *QUATERNIONS))
+        raise AttitudeError(f"{argument}: there is none of {known} in the log")
+    # where they are equally often, the quaternion, which comes first
+    most = max((*QUATERNIONS, ANGLES), key=lambda kind: len(messages.get(kind, ())))
+    times_us, *values = np.array(messages[most], float).T
+    times_ns = np.round(times_us * 1000).astype(np.int64)
+    return log_of_quaternions(argument, times_ns, np.stack(values, axis=-1))
 
 
 def _messages(reader: Any) -> dict[str, list[list[float]]]:
