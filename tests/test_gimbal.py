@@ -186,6 +186,16 @@ def test_recentre_while_held_or_centred_counts_for_the_returning_tracker() -> No
     assert yaw(gimbal, 9.3) == pytest.approx(10)
 
 
+def test_recentre_on_the_way_forward_leaves_the_way_as_it_is() -> None:
+    """Also when nobody looked since the way began."""
+    looked, unlooked = tracking(50), tracking(50)
+    assert yaw(looked, 2.9) == pytest.approx(yaw(looked, 2.9))
+    for gimbal in (looked, unlooked):
+        gimbal.recentre(at(3.0))
+    assert yaw(unlooked, 3.0) == pytest.approx(yaw(looked, 3.0))
+    assert 0 < yaw(unlooked, 3.0) < 50
+
+
 def test_recentre_while_disabled_leaves_the_view_where_it_is() -> None:
     gimbal = tracking(50)
     gimbal.disable(at(1.0))

@@ -24,7 +24,7 @@ from freelook.gimbal import (
     zoom_limits,
 )
 from freelook.gimbal.limits import half_sides, reach, softened
-from freelook.gimbal.zoom import MOST_ENLARGED, sensitivity
+from freelook.gimbal.zoom import MOST_ENLARGED
 from freelook.lens import Equidistant
 from freelook.resolution import resolution_at
 from freelook.rotations import angle_between_deg, body_from_view, head_angles_deg
@@ -214,9 +214,3 @@ def test_zoom_is_limited_by_the_lens_and_by_what_a_view_can_be() -> None:
     limits = zoom_limits(blurred, 4000)
     assert limits.narrowest_deg == limits.widest_deg == pytest.approx(100)
     assert zoom_limits(camera_of(), 1280).clamp(3) == zoom_limits(camera_of(), 1280).narrowest_deg
-
-
-def test_turning_by_hand_slows_down_in_a_narrow_view() -> None:
-    assert sensitivity(90) == 1
-    assert sensitivity(150) == 1
-    assert sensitivity(40) == pytest.approx(math.tan(math.radians(20)))

@@ -336,7 +336,9 @@ def test_an_attitude_that_jumps_does_not_turn_the_view_at_once() -> None:
         assert angle_between_deg(last, base.body_from_base) <= 0.240 + 1e-9
         last = base.body_from_base
         seen.append(base)
-    assert any(base.notice == "the attitude jumped: easing to it" for base in seen)
+    told = [base.notice == "the attitude jumped: easing to it" for base in seen]
+    assert sum(told) > 100, "for as long as it is eased, in milliseconds"
+    assert not told[-1]
     assert nose(flown(yaw=60) * last)[0] == pytest.approx(10)
     assert all(base.effective == "world" for base in seen)
 

@@ -129,11 +129,12 @@ class Gimbal:
         """
         if self._pose is None:
             return
+        state = self._state(now_ns)  # before: a way forward begins from where the head was then
         yaw, pitch, roll = head_angles_deg(self._predicted(now_ns))
         self._yaw_fix = body_from_view(-yaw, 0.0) * RDF_FROM_FRD
         self._mount_fix = (RDF_FROM_FRD * body_from_view(0.0, pitch, roll)).inv()
         self._angles = STRAIGHT
-        if not self._latch and self._state(now_ns) in ("tracking", "holding"):
+        if state in ("tracking", "holding"):
             self._blend = Blend()
 
     def enable(self, now_ns: int) -> None:

@@ -97,6 +97,7 @@ class Stabiliser:
         self._usable = False
         self._known_since_ns: int | None = None
         self._blend = Blend()
+        self._jumping = False  # whether that is because the attitude jumped
         self._newest = BODY
 
     # --- what is told
@@ -197,8 +198,9 @@ class Stabiliser:
         kind = (self._usable, self._choice)
         if self._kind is not None and (kind != self._kind or jumped):
             self._blend = self._eased(self._newest.body_from_base, target, now_ns)
+            self._jumping = jumped
         self._kind = kind
-        return self._compose(target, why, jumped, now_ns)
+        return self._compose(target, why, now_ns)
 
     def _glance(self, now_ns: int, capture_ns: int) -> Base:
         """The base for a frame from before the last one asked about: changes nothing."""
@@ -209,7 +211,7 @@ class Stabiliser:
         target = attitude.inv() * self._world_from_base(self._heading.at(t_ns, attitude), now_ns)
         return replace(self._newest, body_from_base=self._blend.left(now_ns) * target)
 
-    def _compose(self, target: Rotation, why: str, jumped: bool, now_ns: int) -> Base:
+    def _compose(self, target: Rotation, why: str, now_ns: int) -> Base:
         moving = self._blend.active(now_ns)
         effective = self._mode if self._usable else "body"
         turned = moving or effective != "body"
@@ -218,16 +220,16 @@ class Stabiliser:
             base if turned else NOTHING,
             self._mode,
             effective,
-            self._notice(why, jumped),
+            self._notice(why, moving),
             moving,
             turned,
         )
 
-    def _notice(self, why: str, jumped: bool) -> str:
+    def _notice(self, why: str, moving: bool) -> str:
         if self._mode == "body":
             return ""
         if self._usable:
-            return "the attitude jumped: easing to it" if jumped else ""
+            return "the attitude jumped: easing to it" if moving and self._jumping else ""
         return f"{why or 'the attitude is back'}: body mode instead of {self._mode}"
 
     def _eased(self, before: Rotation, after: Rotation, now_ns: int) -> Blend:

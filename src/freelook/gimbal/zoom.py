@@ -46,9 +46,3 @@ def most_focal_px(camera: Camera) -> float:
     """The focal length in view pixels at which a view enlarges the camera's as far as it may."""
     per_degree = float(resolution_at(camera, np.array([0.0, 0.0, 1.0])).mean)
     return MOST_ENLARGED * per_degree * math.degrees(1.0)
-
-
-def sensitivity(field_deg: float) -> float:
-    """By how much turning by hand is slowed down in a narrow view: what is seen then moves across
-    the screen as fast as in a view of 90 degrees; never sped up."""
-    return min(1.0, math.tan(math.radians(field_deg) / 2) / math.tan(math.radians(45.0)))

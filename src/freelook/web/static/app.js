@@ -15,6 +15,7 @@ import { Link } from './link.js';
 import { fillPanel } from './panel.js';
 import { PhoneHead } from './phone.js';
 import { PointerInput } from './pointer.js';
+import { inverse, multiply } from './quaternion.js';
 import { Renderer } from './renderer.js';
 import { framesReceived, report } from './report.js';
 import { Screen } from './screen.js';
@@ -153,10 +154,15 @@ export class App {
     notify(why === null ? `Mode: ${mode}` : `Mode ${mode}: ${why}`);
   }
 
-  nextMode() {
+  /** The next one that is possible: `point` is not without something to point at. */
+  async nextMode() {
     const { modes } = this.station;
     const now = modes.indexOf(this.link.status?.vehicle?.mode ?? modes[0]);
-    return this.setMode(modes[(now + 1) % modes.length]);
+    for (const step of modes.keys()) {
+      const mode = modes[(now + 1 + step) % modes.length];
+      if (await setMode(mode) === null) return notify(`Mode: ${mode}`);
+    }
+    return notify('The station does not change its mode');
   }
 
   /** Where the view looks, within the lens if that is wanted.
@@ -166,6 +172,16 @@ export class App {
     if (this.settings.get('limit') !== 'soft') return aim;
     const view = this.screen.viewOn(this.screen.panes().main);
     return { ...aim, q: this.limit.apply(aim.q, view, nowMs) };
+  }
+
+  /** The hand stops where the lens ends: what it pushed beyond, it would have to pull back first.
+   * @param {number} nowMs */
+  keepHandInLens(nowMs) {
+    const { command, hand } = this;
+    if (command.source !== 'hand' || command.front || !hand.enabled) return;
+    const whole = command.inVehicle(hand.aim());
+    const kept = this.limit.stopped(whole, this.screen.viewOn(this.screen.panes().main), 0);
+    if (kept !== whole) hand.follow(multiply(inverse(command.base), kept), hand.stampMs ?? nowMs);
   }
 
   /** A new picture lies in the textures. @param {FrameTimes} times */
@@ -197,6 +213,7 @@ export class App {
     const nowMs = performance.now();
     this.keyboard.advance(nowMs);
     this.gamepads.advance(nowMs);
+    if (this.settings.get('limit') === 'soft') this.keepHandInLens(nowMs);
     const aim = this.aim(nowMs);
     const stale = this.pictureMs !== null && nowMs - this.pictureMs > STALE_S * 1000;
     this.renderer.grey = stale ? 1 : 0;
