@@ -100,6 +100,24 @@ def test_too_little_is_refused_with_the_reason(rng: np.random.Generator) -> None
         find_offset(seen_turns(track, 3, 5, 10**12, rng), track, (0, 10**9))
 
 
+def test_logs_of_any_length_are_answered_or_refused(rng: np.random.Generator) -> None:
+    track = tumbling(rng, 20)
+    turns = seen_turns(track, 3, 10, 0, rng)
+    late = np.append(track.times_ns, track.times_ns[-1] + 10**17)
+    years = AttitudeTrack(late, Rotation.concatenate([track.world_from_body, turned(0)]))
+    with pytest.raises(AttitudeError, match="too long to look"):
+        find_offset(turns, years)
+    found = find_offset(turns, years, (-(10**9), 10**9))
+    assert abs(found.offset_ns) < CLOSE_NS
+    moment = AttitudeTrack(np.array([0, 1]), Rotation.concatenate([turned(0), turned(1)]))
+    with pytest.raises(AttitudeError, match="too little time in common"):
+        find_offset(turns, moment)
+
+
+def turned(yaw_deg: float) -> Rotation:
+    return Rotation.from_euler("Z", yaw_deg, degrees=True)
+
+
 def test_the_evidence_is_told_in_words(rng: np.random.Generator) -> None:
     track = tumbling(rng, 20)
     text = find_offset(seen_turns(track, 3, 10, 120 * MS, rng), track).evidence

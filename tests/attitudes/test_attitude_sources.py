@@ -88,6 +88,7 @@ def test_csv_lines_that_are_not_numbers_are_counted(tmp_path: Path) -> None:
         ("t_s,qw,qx,qy,qz\n1,1,0,0,0\n", "at least two"),
         ("t_s,gx,gy,gz\n1,0,0,0\n", "fewer than two"),
         ("t_s,qw,qx,qy,qz\n", "at least two"),
+        ("t_s,gx,gy,gz\n0,0,0,0\n1e9,0,0,0\n", "11574.1 days; are they right"),
         (b"\xff\xfe\x00", "not a text file"),
     ],
 )

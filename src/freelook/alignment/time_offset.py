@@ -30,6 +30,7 @@ GRID_S = 0.01
 SLOW_S = 1.0  # what changes more slowly than this says little about time, and is taken off
 NOISE_RAD_S = float(np.radians(0.5))  # of rates from pictures, generously
 SHORTEST_S = 2.0
+LONGEST_S = 24 * 3600.0
 SURE = 0.5
 _APART = 0.5  # a second peak of half the height is none to worry about
 _OVERLAP = 0.5  # of the video's motion, for a lag to be considered
@@ -94,7 +95,16 @@ def find_offset(
             f"{SHORTEST_S:.0f} s are needed to find its time beside the attitude's"
         )
     video = _Video.of(turns)
-    lags_ns, correlation = _correlations(video, track)
+    if between_ns is not None:
+        first_ns, last_ns = int(video.starts_ns[0]), int(video.ends_ns[-1])
+        track = track.part(first_ns + between_ns[0], last_ns + between_ns[1])
+    if track.duration_s > LONGEST_S:
+        raise AttitudeError(
+            f"the log spans {track.duration_s / 3600:.1f} hours, too long to look for the video in "
+            "it; say where it begins"
+        )
+    products = _correlations(video, track)
+    lags_ns, correlation = products.lags_ns, np.trace(products.matrices, axis1=1, axis2=2)
     if between_ns is not None:
         inside = (lags_ns >= between_ns[0]) & (lags_ns <= between_ns[1])
         lags_ns, correlation = lags_ns[inside], correlation[inside]
@@ -125,24 +135,35 @@ class _Video:
         return float(np.median(self.ends_ns - self.starts_ns)) / NS_PER_S
 
 
-def _correlations(video: _Video, track: AttitudeTrack) -> tuple[NDArray[np.int64], Floats]:
-    """Lags in ns, a grid step apart, and the correlation at each; NaN with too little overlap."""
+@dataclass(frozen=True)
+class _Products:
+    """`matrices` (lags, 3, 3): sums of track rate times video rate, over `scale`, at each lag; NaN
+    where the two have too little in common."""
+
+    lags_ns: NDArray[np.int64]
+    matrices: Floats
+
+
+def _correlations(video: _Video, track: AttitudeTrack) -> _Products:
+    """At lags a grid step apart."""
     grid_ns = round(GRID_S * NS_PER_S)
-    count = int((video.ends_ns[-1] - video.starts_ns[0]) // grid_ns)
+    count = int((video.ends_ns[-1] - video.starts_ns[0]) // grid_ns) + 1
     video_times = video.starts_ns[0] + grid_ns * np.arange(count)
     seen, video_rates = _on_grid(video, video_times)
-    length = int((track.times_ns[-1] - track.times_ns[0]) // grid_ns)
+    length = int((track.times_ns[-1] - track.times_ns[0]) // grid_ns) + 1
     track_times = track.times_ns[0] + grid_ns * np.arange(length)
     known, track_rates = _track_rates(track, track_times, video.frame_s)
     a, v = _quick_part(track_rates, known), _quick_part(video_rates, seen)
     common = correlate(known, seen * np.sum(v**2, axis=1), method="fft")
     noise = NOISE_RAD_S**2 * correlate(known, seen, method="fft")
     other = correlate(np.sum(a**2, axis=1), seen, method="fft")
-    product = sum(correlate(a[:, axis], v[:, axis], method="fft") for axis in range(3))
     scale = np.sqrt(np.maximum(common + noise, 1e-12) * np.maximum(other + noise, 1e-12))
     enough = common > _OVERLAP * float(np.sum(seen * np.sum(v**2, axis=1)))
+    scale = np.where(enough & (noise > 1e-12), scale, np.nan)
+    axes = range(3)
+    products = [[correlate(a[:, i], v[:, j], method="fft") / scale for j in axes] for i in axes]
     lags = np.arange(-(count - 1), length) * grid_ns + (track_times[0] - video_times[0])
-    return lags, np.where(enough & (noise > 1e-12), product / scale, np.nan)
+    return _Products(lags, np.stack([np.stack(row, axis=-1) for row in products], axis=-2))
 
 
 def _on_grid(video: _Video, times_ns: NDArray[np.int64]) -> tuple[Floats, Floats]:

@@ -11,11 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..attitude_track import AttitudeTrack, track_of
+from ..clock import NS_PER_S
 from ..errors import AttitudeError
 from ..rate_integration import gyro_bias, integrated, levelled
 from ..types import Attitude, Counters
 
 Floats = NDArray[np.float64]
+LONGEST_S = 2 * 86400.0  # of a record that is integrated
 NOTE_RATES = "attitude integrated from the gyroscope: heading starts at 0 and drifts"
 
 
@@ -77,7 +79,11 @@ def log_of_rates(
     times_ns, rates = times_ns[fine], rates[fine]
     if len(times_ns) < 2:
         raise AttitudeError(f"{name}: fewer than two samples of a gyroscope in the order of time")
-    times_s = (times_ns - times_ns[0]) / 1e9
+    times_s = (times_ns - times_ns[0]) / NS_PER_S
+    if times_s[-1] > LONGEST_S:
+        raise AttitudeError(
+            f"{name}: its gyroscope's times span {times_s[-1] / 86400:.1f} days; are they right?"
+        )
     felt = np.full_like(rates, np.nan)
     if accelerations is None:
         notes = (*notes, f"{NOTE_RATES}; no accelerometer, so the start is taken to be level")

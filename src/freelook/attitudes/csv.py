@@ -36,7 +36,7 @@ FELT = (
     ("ax", "ay", "az"),
     ("accelerometer_m_s2[0]", "accelerometer_m_s2[1]", "accelerometer_m_s2[2]"),
 )
-LONGEST_S = 1e9  # thirty years; more than that is not a time in seconds
+LONGEST_S = 5e9  # seconds since 1970 until the year 2128, and what nanoseconds in 64 bits hold
 LARGEST_DEG = 36_000.0
 
 

@@ -24,7 +24,7 @@ from ..errors import AttitudeError
 from ..rotations import slerp
 from ..viewport import Viewport
 from .containment import Containment, eased, widest_hfov_deg
-from .smoothing import DEFAULT_HZ, smoothed
+from .smoothing import DEFAULT_HZ, LOWEST_HZ, smoothed
 
 EASE_S = 0.5  # to both sides, for which a fraction changes before and after what limits it
 HELD_S = 0.1  # for so long before and after the log its ends are held
@@ -69,7 +69,7 @@ class SmoothAim:
         the picture; that one says how wide a view would be."""
         self._flight = flight
         self._look = look
-        self._path = smoothed(flight.track, cutoff_hz)
+        self._path = smoothed(_needed(flight, cutoff_hz), cutoff_hz)
         steps = flight.steps()
         known = _known(flight.track, steps + flight.zero_ns)
         if not known.any():
@@ -112,6 +112,13 @@ class SmoothAim:
                 f"stabilised, which leaves no room to smooth it; {advice}"
             )
         return containment.largest_fractions(raw, self._steady(steps, raw))
+
+
+def _needed(flight: Flight, cutoff_hz: float) -> AttitudeTrack:
+    """What the filter sees of a log that may be much longer."""
+    reach_ns = round(NS_PER_S / max(LOWEST_HZ, cutoff_hz))
+    end_ns = flight.zero_ns + round(flight.duration_s * NS_PER_S)
+    return flight.track.part(flight.zero_ns - reach_ns, end_ns + reach_ns)
 
 
 def _known(track: AttitudeTrack, times_ns: Times) -> NDArray[np.bool_]:
