@@ -96,14 +96,16 @@ class Gimbal:
         """A new pose, at its own time. One older than the newest is ignored."""
         if self._pose is not None and pose.t_ns < self._pose.t_ns:
             return
-        state = self._state(pose.t_ns)
-        before = self._turned(state, pose.t_ns)
         lost = self._pose is None or self._silence_s(pose.t_ns) > self.settings.lost_after_s
         jumped = not lost and self._is_jump(pose)
         self.jumps += jumped
-        shaped_before = None if lost else self._shaped(pose.t_ns)[0]
+        may_leap = not (lost or jumped or self.settings.shape.plain)
+        if not (lost or jumped or may_leap):
+            return self._take(pose, reset=False)
+        before = self._turned(self._state(pose.t_ns), pose.t_ns)
+        shaped_before = self._shaped(pose.t_ns)[0] if may_leap else CENTRE
         self._take(pose, reset=lost or jumped)
-        leapt = shaped_before is not None and self._leapt(shaped_before, pose.t_ns)
+        leapt = may_leap and self._leapt(shaped_before, pose.t_ns)
         if (lost or jumped or leapt) and not self._latch:
             self._blend_from(before, pose.t_ns)
 
@@ -164,7 +166,8 @@ class Gimbal:
             self._predictor.reset()
         self._predictor.push(pose)
         self._pose = pose
-        self._angles = self._shaped(pose.t_ns)[1]
+        if not self.settings.shape.plain:
+            self._angles = self._shaped(pose.t_ns)[1]
 
     def _predicted(self, now_ns: int) -> Rotation:
         """The head as its tracker would report it, `ahead_s` from now."""
@@ -186,10 +189,7 @@ class Gimbal:
     def _leapt(self, before: Rotation, now_ns: int) -> bool:
         """Whether the shape made a jump of a turn: next to straight up or down, yaw and roll flip,
         and two gains make two different things of that."""
-        shape = self.settings.shape
-        if shape.plain:
-            return False
-        leap_deg = LEAST_JUMP_DEG * max(1.0, shape.most_gain)
+        leap_deg = LEAST_JUMP_DEG * max(1.0, self.settings.shape.most_gain)
         return angle_between_deg(before, self._shaped(now_ns)[0]) > leap_deg
 
     # --- state and way
