@@ -146,7 +146,8 @@ def test_eyes_front_and_back() -> None:
     pilot.take([Key("e", True), Key("e", False)], 8, SIZE)
     assert angles(pilot) == pytest.approx((0, 0, 0))
     pilot.take([Key("e", True)], 9, SIZE)
-    assert angles(pilot) == pytest.approx(turned)
+    assert angles(pilot, 9) == pytest.approx((0, 0, 0)), "back without a jump"
+    assert angles(pilot, 10**9) == pytest.approx(turned)
 
 
 def test_a_tracker_has_control_until_something_is_touched() -> None:

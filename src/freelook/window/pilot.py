@@ -14,7 +14,9 @@ from scipy.spatial.transform import Rotation
 
 from ..clock import NS_PER_S
 from ..errors import TrackerError
-from ..gimbal import MODES, Stabiliser
+from ..gimbal import CENTRE, MODES, Stabiliser
+from ..gimbal.easing import Blend, blend
+from ..gimbal.settings import RATE_DEG_S
 from ..head import Head
 from ..rotations import body_from_view, head_angles_deg
 from ..viewport import NARROWEST_DEG, WIDEST_DEG, Viewport
@@ -26,6 +28,7 @@ STICK_DEG_PER_S = 120.0
 STICK_DEAD = 0.12
 LONGEST_STEP_S = 0.1
 WHEEL_STEP = 1.1
+BACK_S = 0.3  # from eyes front, at least
 STEEP = 0.2  # near straight up or down a drag turns yaw no faster than 1 / STEEP
 
 LOOKS = {"left": (-1, 0), "right": (1, 0), "up": (0, 1), "down": (0, -1)}
@@ -54,6 +57,7 @@ class Pilot:
         self._by_hand = self._tracker is None
         self._yaw_deg = self._pitch_deg = 0.0
         self._enabled = True
+        self._back = Blend()
         self._hand_ns: int | None = None
         self._held: set[str] = set()
         self._pad_held: frozenset[str] = frozenset()
@@ -67,9 +71,9 @@ class Pilot:
             return Look(aim.body_from_view, aim.pose_ns)
         base = self._stabiliser.at(now_ns, capture_ns)
         if not self._enabled:
-            return Look(body_from_view(0.0, 0.0), self._hand_ns)
+            return Look(CENTRE, self._hand_ns)
         hand = body_from_view(self._yaw_deg, self._pitch_deg)
-        return Look(base.body_from_base * hand, self._hand_ns)
+        return Look(self._back.left(now_ns) * base.body_from_base * hand, self._hand_ns)
 
     def take(self, events: Iterable[Event], now_ns: int, size: tuple[int, int]) -> list[str]:
         """Turn, zoom, recentre; returns what is for others to do: "full screen", "draw again",
@@ -126,6 +130,10 @@ class Pilot:
         """Eyes front, or after it, follow again."""
         self._enabled = not self._enabled
         self._hand_ns = now_ns
+        if self._enabled and self._by_hand:  # at once to the front, gently back
+            self._back = Blend()
+            hand = self.look(now_ns).body_from_view
+            self._back = blend(CENTRE, hand, now_ns, at_least_s=BACK_S, rate_deg_s=RATE_DEG_S)
         for head in self._heads.values():
             (head.enable if self._enabled else head.eyes_front)(now_ns)
 
