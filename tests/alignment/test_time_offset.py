@@ -13,9 +13,10 @@ from scipy.spatial.transform import Rotation
 
 from freelook.alignment.image_turns import ImageTurn
 from freelook.alignment.live_offset import LiveOffset
-from freelook.alignment.time_offset import find_offset
+from freelook.alignment.time_offset import find_offset, turned_axes
 from freelook.attitude_track import AttitudeTrack
 from freelook.errors import AttitudeError
+from freelook.rotations import angle_between_deg
 from freelook.types import Attitude
 
 MS = 1_000_000
@@ -98,6 +99,31 @@ def test_too_little_is_refused_with_the_reason(rng: np.random.Generator) -> None
         find_offset(seen_turns(track, 3, 1, 0, rng)[:28], track)
     with pytest.raises(AttitudeError, match="too little time in common"):
         find_offset(seen_turns(track, 3, 5, 10**12, rng), track, (0, 10**9))
+
+
+@pytest.mark.parametrize("wrong_deg", [(0, 0, 90), (30, -40, 10), (180, 0, 0)])
+def test_a_camera_that_is_mounted_differently_is_recognised(
+    rng: np.random.Generator, wrong_deg: tuple[float, float, float]
+) -> None:
+    """What the lens and --mount call the body is turned against the real one."""
+    body_from_told = Rotation.from_euler("ZYX", wrong_deg, degrees=True)
+    track = tumbling(rng, 25)
+    turns = [
+        dataclasses.replace(turn, turn=body_from_told.inv().apply(turn.turn))
+        for turn in seen_turns(track, 5, 12, 120 * MS, rng)
+    ]
+    axes = turned_axes(turns, track)
+    assert axes is not None
+    assert axes.correlation > 0.95
+    assert find_offset(turns, track).correlation < 0.8
+    # rates on a grid of 10 ms, the best lag of which is up to 5 ms away
+    assert angle_between_deg(axes.body_from_told, body_from_told) < 3
+
+
+def test_another_flight_s_log_is_no_matter_of_mounting(rng: np.random.Generator) -> None:
+    axes = turned_axes(seen_turns(tumbling(rng, 30), 5, 15, 0, rng), tumbling(rng, 30))
+    assert axes is not None
+    assert axes.correlation < 0.8
 
 
 def test_logs_of_any_length_are_answered_or_refused(rng: np.random.Generator) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import itertools
+import re
 from pathlib import Path
 
 import av
@@ -158,6 +159,17 @@ def test_a_log_that_shows_no_such_motion_is_not_believed(
     told = capsys.readouterr().err
     assert "do not show it surely" in told or "too little time in common" in told
     assert "--attitude-offset" in told
+
+
+def test_a_wrong_mounting_is_told_with_the_right_one(
+    folder: Path, shared_data: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The camera is said to look right, but looks forward."""
+    assert render(folder, shared_data, "no.mp4", "--stabilize", "horizon", "--mount=90,0,0") == 2
+    told = capsys.readouterr().err
+    mount = re.search(r"--mount=(-?\d+),(-?\d+),(-?\d+): try that", told)
+    assert mount, told
+    assert [abs(int(angle)) for angle in mount.groups()] == pytest.approx([0, 0, 0], abs=2)
 
 
 def test_a_video_s_own_telemetry_has_its_time() -> None:

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import correlate
+from scipy.spatial.transform import Rotation
 
 from ..attitude_track import AttitudeTrack
 from ..clock import NS_PER_S
@@ -116,6 +117,36 @@ def find_offset(
     exact_ns, uncertainty_ns = _refined(video, track, int(lags_ns[best]))
     excitation = float(np.degrees(np.sqrt(np.mean(np.sum(video.rates**2, axis=1)))))
     return TimeOffset(exact_ns, float(correlation[best]), second, uncertainty_ns, excitation)
+
+
+@dataclass(frozen=True)
+class TurnedAxes:
+    """The turn between the axes in which video and attitude tell their rates that makes them most
+    alike: `body_from_told`, from what the video's lens and mounting say is the body to the body of
+    the attitude. `correlation` as in `TimeOffset`, with that turn."""
+
+    body_from_told: Rotation
+    correlation: float
+
+
+def turned_axes(turns: Sequence[ImageTurn], track: AttitudeTrack) -> TurnedAxes | None:
+    """Whether video and attitude would agree if the camera were mounted differently.
+
+    At every lag the rotation is found that makes the correlation largest (Kabsch's, of the rates);
+    the largest of all counts. It needs turning about two axes at least; None without common time.
+    To be asked when `find_offset` is not sure: three more numbers to choose make chance
+    correlations higher, so only a correlation of 0.8 or more says something.
+    """
+    products = _correlations(_Video.of(turns), track)
+    usable = products.matrices[np.isfinite(products.matrices).all(axis=(1, 2))]
+    if not len(usable):
+        return None
+    u, sizes, vt = np.linalg.svd(usable)
+    sign = np.sign(np.linalg.det(u @ vt))
+    sums = sizes[:, 0] + sizes[:, 1] + sign * sizes[:, 2]
+    best = int(sums.argmax())
+    turn = u[best] @ np.diag([1.0, 1.0, sign[best]]) @ vt[best]
+    return TurnedAxes(Rotation.from_matrix(turn), float(sums[best]))
 
 
 @dataclass(frozen=True)
