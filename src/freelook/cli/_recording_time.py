@@ -61,8 +61,8 @@ def _mounting_hint(
     camera_from_body = camera.camera_from_body * axes.body_from_told.inv()
     yaw, pitch, roll = head_angles_deg(camera_from_body.inv())
     return (
-        f"Video and log would agree better (correlation {axes.correlation:.2f}) if the camera were mounted with "
-        f"--mount={yaw:.0f},{pitch:.0f},{roll:.0f}: try that. "
+        f"Video and log would agree better (correlation {axes.correlation:.2f}) if the camera were "
+        f"mounted with --mount={yaw:.0f},{pitch:.0f},{roll:.0f}: try that. "
     )
 
 
