@@ -18,7 +18,7 @@ from freelook.camera import make_camera
 from freelook.color import i420_from_rgb, rgb_from_picture
 from freelook.errors import MissingExtra, RenderError
 from freelook.lens import Equidistant
-from freelook.renderers import Renderer, gl_context
+from freelook.renderers import Renderer, gl_context, gl_shader
 from freelook.renderers.blank import black_of
 from freelook.renderers.cpu import CpuRenderer
 from freelook.renderers.gl import GlRenderer
@@ -262,3 +262,33 @@ def test_how_much_a_view_shrinks_is_estimated_from_above(hfov_deg: float) -> Non
     down = np.linalg.norm(np.diff(pixels, axis=0), axis=-1).max()
     measured = max(across, down)
     assert measured * 0.99 < most_shrunk(CAMERA, viewport) < 2 * measured
+
+
+PICTURES = (("PLANES",), ("NV12",), ())
+VARIANTS = [
+    *((*kind, *more) for kind in PICTURES for more in ((), ("BENT", "ANTIALIAS", "BICUBIC"))),
+    *((*kind, "VIEWER", "ANTIALIAS") for kind in PICTURES),
+    ("PLANE", "BICUBIC"),
+    ("PLANE", "BENT", "ANTIALIAS"),
+    ("COORDINATES", "BENT"),
+    ("PLANES", "FISHEYE"),
+]
+
+
+@pytest.mark.parametrize("defines", VARIANTS, ids=lambda names: "-".join(names) or "plain")
+def test_the_shader_is_understood_as_the_pages_and_as_ours(
+    defines: tuple[str, ...], gl: GlRenderer
+) -> None:
+    """Desktop OpenGL from 4.3 on reads the language of WebGL2 too."""
+    page = "#version 300 es\nprecision highp float;\nprecision highp int;\n"
+    context = gl_context.open_context()
+    headers = [gl_shader.HEADER, page] if context.version_code >= 430 else [gl_shader.HEADER]
+    with context:
+        for header in headers:
+            version = header.partition("\n")[0] + "\n"
+            head = header + "".join(f"#define {name}\n" for name in defines)
+            context.program(
+                vertex_shader=gl_shader.VERTEX.replace(gl_shader.HEADER, version),
+                fragment_shader=head + gl_shader.body(),
+            )
+    context.release()

@@ -21,6 +21,7 @@ from freelook.cli import main
 from freelook.errors import MissingExtra, RenderError, SinkError
 from freelook.renderers.gl_context import open_context
 from freelook.rotations import RDF_FROM_FRD, body_from_view
+from freelook.viewport import Viewport
 from freelook.window.flight import AFTER_DAMAGE
 from freelook.window.painting import EyesPainter
 from freelook.window.surface import Monitor, choose_monitor
@@ -107,6 +108,19 @@ def test_a_window_shows_the_view(screen: XScreen) -> None:
     assert state["yaw"] > AHEAD_DEG[0]
     assert state["poses"] == poses + 1  # one more pose was measured from hand to screen
     assert np.abs(screen.picture().astype(int) - off_screen(state["yaw"])).max() <= 1
+
+    screen.press("right")
+    turned = state["yaw"]
+    screen.drag((100, 100), (140, 100))  # the picture follows the mouse: the head turns left
+    program.go_on()
+    state = program.said()
+    while state["yaw"] > turned:  # the key may still have been held for a view
+        turned = state["yaw"]
+        program.go_on()
+        state = program.said()
+    half = Viewport((SCREEN[0] // 2, SCREEN[1]), HFOV_DEG)
+    dragged_deg = 40 * np.degrees(1 / half.focal_px) / np.cos(np.radians(AHEAD_DEG[1]))
+    assert state["yaw"] == pytest.approx(turned - dragged_deg, abs=0.01)
 
     screen.ask_to_close()
     program.go_on()

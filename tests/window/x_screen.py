@@ -6,6 +6,7 @@ import ctypes
 import os
 import shutil
 import subprocess
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +14,16 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-KEY_PRESS, KEY_RELEASE, CLIENT_MESSAGE = 2, 3, 33
-KEY_MASK = 1 << 0
+KEY_PRESS, KEY_RELEASE, BUTTON_PRESS, BUTTON_RELEASE, MOTION, CLIENT_MESSAGE = 2, 3, 4, 5, 6, 33
+# what a window must have asked for to be sent it: 0 is sent to its owner in any case
+MASKS = {KEY_PRESS: 1, KEY_RELEASE: 2, BUTTON_PRESS: 4, BUTTON_RELEASE: 8, MOTION: 64}
 KEYSYMS = {"right": 0xFF53, "left": 0xFF51, "q": 0x71, "f": 0x66}
 DEPTH = 24
 
 
 class XKeyEvent(ctypes.Structure):
+    """Those of buttons and of the pointer's motion have the same form; `keycode` is the button."""
+
     _fields_ = (
         ("type", ctypes.c_int),
         ("serial", ctypes.c_ulong),
@@ -106,9 +110,13 @@ class XScreen:
     def press(self, key: str, *, release: bool = True) -> None:
         """On the window, as the server would tell it of a keyboard's."""
         for kind in (KEY_PRESS, KEY_RELEASE) if release else (KEY_PRESS,):
-            self._send(
-                lambda x11, display, window, kind=kind: _key(x11, display, window, kind, key)
-            )
+            self._send(partial(_key, kind=kind, key=key))
+
+    def drag(self, start: tuple[int, int], end: tuple[int, int]) -> None:
+        """With the left button held, over the window."""
+        for kind, at in ((MOTION, start), (BUTTON_PRESS, start), (MOTION, end)):
+            self._send(partial(_pointer, kind=kind, at=at))
+        self._send(partial(_pointer, kind=BUTTON_RELEASE, at=end))
 
     def ask_to_close(self) -> None:
         """As a window manager does for its X button."""
@@ -125,9 +133,8 @@ class XScreen:
         assert display
         window = _only_window(x11, display)
         event = make(x11, display, window)
-        assert x11.XSendEvent(
-            display, window, 1, KEY_MASK * (event.key.type != CLIENT_MESSAGE), ctypes.byref(event)
-        )
+        mask = MASKS.get(event.key.type, 0)
+        assert x11.XSendEvent(display, window, 1, mask, ctypes.byref(event))
         x11.XSync(display, 0)
         x11.XCloseDisplay(display)
 
@@ -197,6 +204,22 @@ def _key(x11: Any, display: int, window: int, kind: int, key: str) -> XEvent:
         root=x11.XDefaultRootWindow(display),
         time=0,
         keycode=x11.XKeysymToKeycode(display, KEYSYMS[key]),
+        same_screen=1,
+    )
+    return event
+
+
+def _pointer(x11: Any, display: int, window: int, kind: int, at: tuple[int, int]) -> XEvent:
+    event = XEvent()
+    event.key = XKeyEvent(
+        type=kind,
+        send_event=1,
+        display=display,
+        window=window,
+        root=x11.XDefaultRootWindow(display),
+        x=at[0],
+        y=at[1],
+        keycode=0 if kind == MOTION else 1,
         same_screen=1,
     )
     return event

@@ -22,6 +22,7 @@ from ..types import Picture, Plane
 from ..viewport import Viewport
 from . import kernels
 from .blank import Sampling, black_of, check_fits, plane_scales
+from .window import rim_px, window_of
 
 # measured; multiples of the node spacings, so that no node is computed twice
 BAND_ROWS = (128, 144, 112, 96)
@@ -30,7 +31,8 @@ ROUND = np.empty((0, 0, 2), np.float32)  # the offset grid of a round lens
 
 FloatMap = NDArray[np.float32]
 _Band = Callable[[int, int, "_Scratch"], None]
-_Constants = tuple[Any, ...]
+_Fill = Callable[[int, FloatMap, FloatMap], bool]  # first row, luma's maps, chroma's
+_Filler = Callable[[Rotation], _Fill]
 
 
 class CpuRenderer:
@@ -46,14 +48,13 @@ class CpuRenderer:
         self._pool = ThreadPoolExecutor(self._threads - 1) if self._threads > 1 else None
         self._scratch = [_Scratch() for _ in range(self._threads)]
         self._made_for: tuple[Camera | None, Viewport | None] = (None, None)
-        self._constants: _Constants = ()
+        self._filler: _Filler | None = None
 
     def render(
         self, picture: Picture, camera: Camera, camera_from_view: Rotation, viewport: Viewport
     ) -> Picture:
         check_fits(picture, camera)
-        rotation = camera_from_view.as_matrix().astype(np.float32)
-        constants = self._constants_of(camera, viewport)
+        fill = self._filler_of(camera, viewport)(camera_from_view)
         scales = plane_scales(picture)
         width, height = viewport.size
         view = tuple(
@@ -65,7 +66,7 @@ class CpuRenderer:
 
         def render_band(first_row: int, rows: int, scratch: _Scratch) -> None:
             luma, chroma = scratch.maps(width, rows, halves)
-            rim = kernels.fill_band(first_row, rotation, *constants, luma, chroma)
+            rim = fill(first_row, luma, chroma)
             for plane, out, scale, black in planes:
                 maps = luma if scale == 1 else chroma
                 band = out[first_row // scale :][: maps.shape[1]]
@@ -76,12 +77,13 @@ class CpuRenderer:
         self._run(render_band, _bands(viewport.size[1], self._threads))
         return Picture(picture.layout, view, picture.color)
 
-    def _constants_of(self, camera: Camera, viewport: Viewport) -> _Constants:
+    def _filler_of(self, camera: Camera, viewport: Viewport) -> _Filler:
         """Kept from view to view: usually only the direction changes."""
-        if self._made_for[0] is not camera or self._made_for[1] is not viewport:
+        made_for = self._made_for
+        if self._filler is None or made_for[0] is not camera or made_for[1] is not viewport:
             self._made_for = (camera, viewport)
-            self._constants = _constants(camera, viewport)
-        return self._constants
+            self._filler = _filler(camera, viewport)
+        return self._filler
 
     def _run(self, band: _Band, bands: list[tuple[int, int]]) -> None:
         """All bands, taken one by one by this thread and those of the pool."""
@@ -99,13 +101,12 @@ class CpuRenderer:
 
 def coordinates(camera: Camera, camera_from_view: Rotation, viewport: Viewport) -> FloatMap:
     """Where each view pixel looks, as rendered: float32 (2, height, width); NaN where unseen."""
-    rotation = camera_from_view.as_matrix().astype(np.float32)
-    constants = _constants(camera, viewport)
+    fill = _filler(camera, viewport)(camera_from_view)
     width, height = viewport.size
     pixels = np.empty((2, height, width), np.float32)
     for first_row, rows in _bands(height, 1):
         maps, none = _Scratch().maps(width, rows, False)
-        if kernels.fill_band(first_row, rotation, *constants, maps, none):
+        if fill(first_row, maps, none):
             maps[:2, maps[2] > camera.table.t_max] = np.nan
         pixels[:, first_row : first_row + rows] = maps[:2]
     return pixels
@@ -131,11 +132,16 @@ class _Scratch:
         )
 
 
-def _constants(camera: Camera, viewport: Viewport) -> _Constants:
-    """What `kernels.fill_band` needs to know of camera and viewport."""
-    return (
+def _filler(camera: Camera, viewport: Viewport) -> _Filler:
+    """What fills bands of views in any direction with coordinates."""
+    return _window_filler(camera, viewport) if viewport.kind.cut else _ray_filler(camera, viewport)
+
+
+def _ray_filler(camera: Camera, viewport: Viewport) -> _Filler:
+    constants: tuple[Any, ...] = (
         viewport.size,
         viewport.focal_px,
+        viewport.kind.code,
         camera.table.g,
         np.float32(camera.table.t_max),
         np.asarray(camera.center, dtype=np.float32),
@@ -143,6 +149,32 @@ def _constants(camera: Camera, viewport: Viewport) -> _Constants:
         camera.grid.offsets if camera.grid else ROUND,
         np.float32(camera.grid.p_max if camera.grid else 1.0),
     )
+
+    def towards(camera_from_view: Rotation) -> _Fill:
+        rotation = camera_from_view.as_matrix().astype(np.float32)
+        return lambda row, luma, chroma: kernels.fill_band(row, rotation, *constants, luma, chroma)
+
+    return towards
+
+
+def _window_filler(camera: Camera, viewport: Viewport) -> _Filler:
+    t_max = np.float32(camera.table.t_max)
+    constants: tuple[Any, ...] = (
+        np.asarray(camera.center, dtype=np.float32),
+        np.linalg.inv(camera.stretch).astype(np.float32),
+        np.float32(t_max / rim_px(camera) ** 2),
+        t_max,
+    )
+
+    def towards(camera_from_view: Rotation) -> _Fill:
+        window = window_of(camera, camera_from_view, viewport)
+        corner = window.at(np.zeros(2)).astype(np.float32)
+        slopes = window.slopes.astype(np.float32)
+        return lambda row, luma, chroma: kernels.fill_window(
+            row, corner, slopes, *constants, luma, chroma
+        )
+
+    return towards
 
 
 @lru_cache

@@ -40,14 +40,15 @@ class GlRenderer:
         self._context = open_context(device)
         self.name = str(self._context.info["GL_RENDERER"])
         self._targets: dict[tuple[int, int, int, str], Any] = {}
+        self._stores: list[Any] = []  # their textures
         with self._context:
             self._painter = Painter(self._context, sampling, antialias)
 
     def close(self) -> None:
         """Give the GPU's memory back; nothing can be rendered after it."""
         with self._context:
-            self._context.gc()
-        self._context.release()
+            self._forget_targets()
+        self._context.release()  # and with it all that it knows
 
     def render(
         self, picture: Picture, camera: Camera, camera_from_view: Rotation, viewport: Viewport
@@ -96,11 +97,17 @@ class GlRenderer:
         key = (width, height, count, kind)
         if key not in self._targets:
             if len(self._targets) > 8:  # views of ever new sizes
-                self._targets.clear()
+                self._forget_targets()
             texture = self._context.texture((width, height), count, dtype=kind)
             self._targets[key] = self._context.framebuffer([texture])
+            self._stores.append(texture)
         self._key = key
         self._targets[key].use()
+
+    def _forget_targets(self) -> None:
+        for gone in (*self._targets.values(), *self._stores):
+            gone.release()
+        self._targets, self._stores = {}, []
 
     def _read(self, dtype: Any) -> Any:
         width, height, count, kind = self._key

@@ -33,6 +33,5 @@ def open_context(device: int = 0) -> Any:
             f"OpenGL {VERSION // 100}.{VERSION // 10 % 10} without a window cannot be had here "
             f"({error}); render on the CPU, or see what 'freelook doctor' says of graphics"
         ) from None
-    context.gc_mode = "auto"
     context.__exit__(None, None, None)
     return context

@@ -8,12 +8,19 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from ..projections import FORMULAS
+
 F32 = NDArray[np.float32]
 FAR = np.float32(4.0)  # rays are followed to this many times t_max, then held: all black anyway
 
 TOLERANCE_PX = np.float32(0.005)
 COARSEST, FINEST = 16, 2  # view pixels between nodes
 RIM = np.float32(0.98)  # of t_max: below it, no pixel of the view is feathered
+
+PERSPECTIVE, PANNINI, STEREOGRAPHIC, CYLINDRICAL, EQUIRECTANGULAR = (
+    FORMULAS.index(name)
+    for name in ("perspective", "pannini", "stereographic", "cylindrical", "equirectangular")
+)
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
@@ -22,6 +29,7 @@ def fill_band(
     camera_from_view: F32,
     size: tuple[int, int],
     focal_px: float,
+    formula: int,
     g: F32,
     t_max: Any,
     center: F32,
@@ -32,6 +40,8 @@ def fill_band(
     chroma: F32,
 ) -> bool:
     """Coordinates for a band of a view of `size` (width, height) that starts at `first_row`.
+
+    formula is that of the view's rays, its place in `freelook.projections.FORMULAS`.
 
     luma (3, rows, columns) gets where each pixel looks, x and y in pixels of the picture, and
     its t; chroma the same for planes half as large, in their pixels; chroma may be empty. offsets
@@ -45,7 +55,7 @@ def fill_band(
     rows = luma.shape[1]
     while True:
         nodes = np.empty((3, (rows - 1) // step + 4, (size[0] - 1) // step + 4), np.float32)
-        project_nodes(nodes, first_row, step, size, focal_px, camera_from_view, g, t_max)
+        project_nodes(nodes, first_row, step, size, focal_px, formula, camera_from_view, g, t_max)
         if len(offsets):
             add_offsets(nodes, g, t_max, offsets, p_max)
         place_nodes(nodes, center, stretch)
@@ -65,6 +75,7 @@ def project_nodes(
     step: int,
     size: tuple[int, int],
     focal_px: float,
+    formula: int,
     camera_from_view: F32,
     g: F32,
     t_max: float,
@@ -81,22 +92,46 @@ def project_nodes(
     far = FAR * t_max
     for row in range(nodes.shape[1]):
         y = (f32(first_row + (row - 1) * step) - cy) / focal
-        for column in range(nodes.shape[2]):
-            x = (f32((column - 1) * step) - cx) / focal
-            dx = r[0, 0] * x + r[0, 1] * y + r[0, 2]
-            dy = r[1, 0] * x + r[1, 1] * y + r[1, 2]
-            dz = r[2, 0] * x + r[2, 1] * y + r[2, 2]
-            length = np.sqrt(dx * dx + dy * dy + dz * dz)
-            inverse = f32(1) / max(length + dz, f32(1e-6) * length)
-            px, py = dx * inverse, dy * inverse
-            t = px * px + py * py
-            if t > far:
-                shrink = np.sqrt(far / t)
-                px, py, t = px * shrink, py * shrink, far
-            gain = look_up(g, (np.sqrt(t) + t) * per_place)
-            nodes[0, row, column] = px * gain
-            nodes[1, row, column] = py * gain
-            nodes[2, row, column] = t
+        if formula == PERSPECTIVE:  # a loop of its own, as fast as it can be
+            for column in range(nodes.shape[2]):
+                x = (f32((column - 1) * step) - cx) / focal
+                set_node(nodes[:, row, column], r, x, y, f32(1), g, per_place, far)
+        else:
+            for column in range(nodes.shape[2]):
+                x = (f32((column - 1) * step) - cx) / focal
+                rx, ry, rz = view_ray(formula, x, y)
+                set_node(nodes[:, row, column], r, rx, ry, rz, g, per_place, far)
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def view_ray(formula: int, x: Any, y: Any) -> tuple[Any, Any, Any]:
+    """The ray through a place of a view that is not perspective (see `freelook.projections`)."""
+    one, four = np.float32(1), np.float32(4)
+    if formula == PANNINI:
+        return x, y, one - x * x / four
+    if formula == STEREOGRAPHIC:
+        return x, y, one - (x * x + y * y) / four
+    if formula == CYLINDRICAL:
+        return np.sin(x), y, np.cos(x)
+    return np.sin(x) * np.cos(y), np.sin(y), np.cos(x) * np.cos(y)
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True, inline="always")
+def set_node(node: F32, r: F32, x: Any, y: Any, z: Any, g: F32, per_place: Any, far: Any) -> None:
+    """A node (x, y, t) from its ray (x, y, z) in the view frame."""
+    f32 = np.float32
+    dx = r[0, 0] * x + r[0, 1] * y + r[0, 2] * z
+    dy = r[1, 0] * x + r[1, 1] * y + r[1, 2] * z
+    dz = r[2, 0] * x + r[2, 1] * y + r[2, 2] * z
+    length = np.sqrt(dx * dx + dy * dy + dz * dz)
+    inverse = f32(1) / max(length + dz, f32(1e-6) * length)
+    px, py = dx * inverse, dy * inverse
+    t = px * px + py * py
+    if t > far:
+        shrink = np.sqrt(far / t)
+        px, py, t = px * shrink, py * shrink, far
+    gain = look_up(g, (np.sqrt(t) + t) * per_place)
+    node[0], node[1], node[2] = px * gain, py * gain, t
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
@@ -256,3 +291,40 @@ def feather(view: NDArray[np.uint8], t: F32, t_max: float, black: Any) -> None:
                 for k in range(view.shape[2]):
                     value = black + seen * (view[row, column, k] - black)
                     view[row, column, k] = np.uint8(value + np.float32(0.5))
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def fill_window(
+    first_row: int,
+    corner: F32,
+    slopes: F32,
+    center: F32,
+    round_from_picture: F32,
+    t_per_px2: Any,
+    t_max: Any,
+    luma: F32,
+    chroma: F32,
+) -> bool:
+    """As `fill_band`, for a crop: corner + slopes @ (x, y) is where view pixel (x, y) looks.
+
+    In place of t it gets what is as large as that on the rim: `t_per_px2` times the square of the
+    distance from the axis in the round image.
+    """
+    rim = False
+    for maps, scale in ((luma, 1), (chroma, 2)):
+        between = np.float32((scale - 1) / 2)
+        for row in range(maps.shape[1]):
+            y = np.float32(first_row + row * scale) + between
+            for column in range(maps.shape[2]):
+                x = np.float32(column * scale) + between
+                u = corner[0] + slopes[0, 0] * x + slopes[0, 1] * y
+                v = corner[1] + slopes[1, 0] * x + slopes[1, 1] * y
+                maps[0, row, column] = (u - between) / scale
+                maps[1, row, column] = (v - between) / scale
+                u, v = u - center[0], v - center[1]
+                away_x = round_from_picture[0, 0] * u + round_from_picture[0, 1] * v
+                away_y = round_from_picture[1, 0] * u + round_from_picture[1, 1] * v
+                t = (away_x * away_x + away_y * away_y) * t_per_px2
+                maps[2, row, column] = t
+                rim |= t > t_max * RIM
+    return rim

@@ -13,6 +13,7 @@ from ..lens import Floats
 from ..types import Picture, Plane
 from ..viewport import Viewport
 from .blank import Sampling, black_of, check_fits, plane_scales
+from .window import window_coordinates
 
 
 class ReferenceRenderer:
@@ -37,6 +38,8 @@ class ReferenceRenderer:
 
 def coordinates(camera: Camera, camera_from_view: Rotation, viewport: Viewport) -> Floats:
     """Where each view pixel looks in the picture: (height, width, 2); NaN where nothing is seen."""
+    if viewport.kind.cut:
+        return window_coordinates(camera, camera_from_view, viewport)
     rays = viewport.rays()
     return camera.project(camera_from_view.apply(rays.reshape(-1, 3)).reshape(rays.shape))
 

@@ -87,6 +87,7 @@ class Surface:
             raise SinkError(_why_no_display(self._glfw))
         try:
             self._window = self._open(monitor)
+            self.context = self._make_context()
         except BaseException:
             self._glfw.terminate()
             raise
@@ -95,7 +96,6 @@ class Surface:
         self._events: list[Event] = []
         self._mouse: tuple[float, float] | None = None
         self._listen()
-        self.context = moderngl().create_context(require=VERSION, context=_Loader(self._glfw))
 
     def __enter__(self) -> Surface:
         return self
@@ -208,6 +208,14 @@ class Surface:
         if wanted is not None:
             self._fill(wanted)
         return window
+
+    def _make_context(self) -> Any:
+        try:
+            return moderngl().create_context(require=VERSION, context=_Loader(self._glfw))
+        except MissingExtra:
+            raise
+        except Exception as error:  # moderngl raises bare Exception
+            raise SinkError(f"the window's OpenGL cannot be used: {error}") from None
 
     def _fill(self, monitor: Monitor) -> None:
         rate = round(monitor.refresh_hz) or self._glfw.DONT_CARE
