@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING
 
 from ..renderers.blank import SAMPLINGS
@@ -34,7 +36,12 @@ def add_sampling_argument(parser: argparse.ArgumentParser) -> None:
 
 
 def opened_renderer(args: argparse.Namespace) -> Renderer:
-    """Says which and why, where there was anything to choose from.
+    """Says which and why, where there was anything to choose from."""
+    return renderer_maker(args)()
+
+
+def renderer_maker(args: argparse.Namespace) -> Callable[[], Renderer]:
+    """What makes one more of the chosen kind.
 
     The drivers are asked only where their answer could matter: that takes a moment.
     """
@@ -45,4 +52,4 @@ def opened_renderer(args: argparse.Namespace) -> Renderer:
     choice = choose(args.renderer, best_device() if ask else None, has_moderngl())
     if ask:
         say(f"renderer: {choice}")
-    return open_renderer(choice, args.sampling)
+    return partial(open_renderer, choice, args.sampling)

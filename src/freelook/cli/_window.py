@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import signal
-import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -14,12 +12,14 @@ from ..camera import Camera
 from ..clock import now_ns
 from ..gimbal import LensLimit
 from ._arguments import size
-from ._progress import StatusLine, say
-from ._renderers import add_sampling_argument
+from ._progress import say
+from ._shows import FlightLine, shown_outputs
+from ._signals import asked_to_stop
 from ._stabilising import vehicle_for
 
 if TYPE_CHECKING:
     from ..ingest import Ingest
+    from ..outputs.spec import OutputSpec
     from ..vehicle import Vehicle
     from ..window.ages import Figures
 
@@ -58,7 +58,6 @@ def add_window_arguments(parser: argparse.ArgumentParser) -> None:
     window.add_argument(
         "--no-vsync", action="store_true", help="do not wait for the screen: sooner, but torn"
     )
-    add_sampling_argument(parser)
 
 
 def two_numbers(text: str) -> tuple[float, float]:
@@ -70,8 +69,17 @@ def two_numbers(text: str) -> tuple[float, float]:
     return one, two
 
 
-def fly_in_window(args: argparse.Namespace, ingest: Ingest, camera: Camera) -> None:
-    """Until the window is closed or Ctrl-C; then says how old poses were when they were shown."""
+def fly_in_window(
+    args: argparse.Namespace,
+    ingest: Ingest,
+    camera: Camera,
+    window: OutputSpec,
+    others: Sequence[OutputSpec] = (),
+) -> None:
+    """Until the window is closed or Ctrl-C; then says how old poses were when they were shown.
+
+    `others` are shown at the same time.
+    """
     from ..window.eyes import Optics
     from ..window.flight import Flight, Outside
     from ..window.pilot import Pilot
@@ -81,35 +89,42 @@ def fly_in_window(args: argparse.Namespace, ingest: Ingest, camera: Camera) -> N
     optics = Optics(args.eyes, args.eye_offset, args.viewer_lens)
     vehicle = vehicle_for(args, ingest, camera)
     with contextlib.ExitStack() as opened:
-        surface = opened.enter_context(Surface(args.window_size, args.monitor, not args.no_vsync))
+        size_points = window.size or args.window_size
+        surface = opened.enter_context(Surface(size_points, args.monitor, not args.no_vsync))
         say(f"window: drawn by {surface.renderer}")
         say(KEYS)
         gimbal = partial(gimbal_for, args, vehicle.stabiliser)
         heads = open_heads(args.tracker, gimbal, opened)
         opened.callback(vehicle.close)
         opened.callback(ingest.close)
+        line = opened.enter_context(FlightLine(others))
+        outputs = opened.enter_context(
+            shown_outputs(args, others, ingest, camera, heads, vehicle.stabiliser, line)
+        )
         frames = ingest.frames()
         ingest.start()
         vehicle.start()
         for head in heads.values():
             head.start()
-        line = opened.enter_context(StatusLine())
-        report = _report(ingest, vehicle, line)
+        report = _report(ingest, vehicle, line, outputs)
         outside = Outside(now_ns, opened.enter_context(asked_to_stop()), report)
-        pilot = Pilot(heads, args.hfov, vehicle.stabiliser)
+        pilot = Pilot(heads, window.hfov_deg or args.hfov, vehicle.stabiliser)
         limit = LensLimit(camera) if args.limit == "soft" else None
         flight = Flight(surface, frames, camera, pilot, outside, optics, args.sampling, limit)
         opened.callback(lambda: say(summary(flight.figures)))
         flight.run()
 
 
-def _report(ingest: Ingest, vehicle: Vehicle, line: StatusLine) -> Callable[[int], float]:
+def _report(
+    ingest: Ingest, vehicle: Vehicle, line: FlightLine, outputs: Callable[[], str]
+) -> Callable[[int], float]:
     """Says how the source and the mode are; the picture greys while the source is lost."""
 
     def grey(at_ns: int) -> float:
         status = ingest.status(at_ns)
         mode = vehicle.status()
         parts = [f"source: {status.state}", status.message, f"mode: {mode.mode}", mode.message]
+        parts.append(outputs())
         line.show("; ".join(filter(None, parts)))
         return 1.0 if status.state == "lost" else 0.0
 
@@ -123,18 +138,3 @@ def summary(figures: Figures) -> str:
         f"window: {figures.views} views, {figures.rate_hz:.1f} a second, {figures.missed} late; "
         f"pose to swap: {figures.pose_to_swap}; pose read to swap: {figures.latch_to_swap}"
     )
-
-
-@contextlib.contextmanager
-def asked_to_stop() -> Iterator[Callable[[], bool]]:
-    """Whether SIGINT or SIGTERM came: the window is closed then, and all that is open."""
-    asked = threading.Event()
-    before = {
-        number: signal.signal(number, lambda *_: asked.set())
-        for number in (signal.SIGINT, signal.SIGTERM)
-    }
-    try:
-        yield asked.is_set
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

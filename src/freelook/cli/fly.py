@@ -5,8 +5,10 @@ view with the newest head pose. Stop with Ctrl-C.
 
   freelook fly /dev/video0 --lens lens.json
   freelook fly camera.sdp --lens lens.json --tracker opentrack --show window --monitor 2
+  freelook fly camera.sdp --lens lens.json --show page --show stream:rtp://192.168.1.5:5600,hfov=70
 
 With --show window the view is drawn on a screen of this machine instead: goggles on HDMI, say.
+Streams, files, snapshots and the terminal are rendered here, each with its own view.
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import contextlib
+import re
 import threading
 import webbrowser
 from collections.abc import Callable, Iterator, Sequence
@@ -29,7 +32,9 @@ from ..trackers import known_trackers, open_tracker
 from ..viewport import Viewport
 from ._cameras import add_lens_arguments, mounted_camera
 from ._circles import camera_by_circle
-from ._progress import StatusLine, say
+from ._progress import say
+from ._renderers import add_renderer_arguments
+from ._shows import FlightLine, add_show_argument, fly_outputs, parsed_shows, shown_outputs
 from ._stabilising import (
     add_head_arguments,
     add_mode_arguments,
@@ -40,12 +45,14 @@ from ._window import add_window_arguments, fly_in_window
 
 if TYPE_CHECKING:  # the web libraries are slow to load, and may be missing
     from ..ingest import Ingest
+    from ..outputs.spec import OutputSpec
     from ..web.serving import Door, Ending
     from ..web.station import About, Station
 
 DEFAULT_PORT = 8042
 HOLD_S = GimbalSettings().hold_s
 EASE_S = GimbalSettings().ease_s
+NAMED = re.compile(r"(?:([\w-]+)=)?(.*)", re.DOTALL)  # a tracker, maybe with a name of its own
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -56,12 +63,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_lens_arguments(parser)
     parser.add_argument("--loop", action="store_true", help="play a recording over and over")
-    parser.add_argument(
-        "--show",
-        choices=("page", "window"),
-        default="page",
-        help="a page for browsers, or a window on this machine",
-    )
+    add_show_argument(parser)
+    add_renderer_arguments(parser)
     add_flying_arguments(parser)
     add_window_arguments(parser)
 
@@ -72,7 +75,7 @@ def add_flying_arguments(parser: argparse.ArgumentParser) -> None:
         "--tracker",
         action="append",
         default=[],
-        metavar="KIND:ARGUMENT",
+        metavar="[NAME=]KIND:ARGUMENT",
         help=f"a head tracker, can be given again (kinds: {', '.join(known_trackers())}); "
         "mouse, touch, keys, gamepad and phone work in the page without any",
     )
@@ -128,15 +131,18 @@ def run(args: argparse.Namespace) -> int:
     from ..sources import open_source
 
     Viewport((16, 9), args.hfov)  # says what is wrong with it before the camera is asked
+    first, others = parsed_shows(args.show)
     camera = mounted_camera(args, lambda fov_deg: camera_by_circle(args.source, fov_deg))
     ingest = Ingest(lambda: open_source(args.source, loop=args.loop))
-    if args.show == "window":
-        fly_in_window(args, ingest, camera)
-        return 0
-    from ..web.station import About
+    if first.kind == "window":
+        fly_in_window(args, ingest, camera, first, others)
+    elif first.kind == "page":
+        from ..web.station import About
 
-    about = About(args.source, False, args.hold, args.ease, args.hfov, args.limit)
-    fly(args, ingest, camera, about, never)
+        about = About(args.source, False, args.hold, args.ease, args.hfov, args.limit)
+        fly(args, ingest, camera, about, never, others=others)
+    else:
+        fly_outputs(args, ingest, camera, [first, *others])
     return 0
 
 
@@ -147,10 +153,12 @@ def fly(
     about: About,
     until: Ending,
     explain: Callable[[str], str] = lambda _state: "",
+    others: Sequence[OutputSpec] = (),
 ) -> None:
     """Serve the page until Ctrl-C or until `until` returns or raises.
 
-    `explain(state of the source)` may replace what is printed about the source.
+    `explain(state of the source)` may replace what is printed about the source; `others` are
+    shown at the same time.
     """
     from ..web.server import make_app
     from ..web.serving import serve
@@ -159,16 +167,19 @@ def fly(
     Viewport((16, 9), about.hfov_deg)  # these two say what is wrong with them
     gimbal_settings(args)
     vehicle = vehicle_for(args, ingest, camera)
-    with contextlib.ExitStack() as opened, StatusLine() as line:
+    with contextlib.ExitStack() as opened, FlightLine(others) as line:
         gimbal = partial(gimbal_for, args, vehicle.stabiliser)
         heads = open_heads(args.tracker, gimbal, opened)
         door = opened.enter_context(opened_door(args))
+        outputs = opened.enter_context(
+            shown_outputs(args, others, ingest, camera, heads, vehicle.stabiliser, line)
+        )
         station = Station(ingest, camera, heads, about, vehicle=vehicle)
         serving = serve(
             make_app(station, door.guard),
             door,
             ready=lambda: announce(door, not args.no_browser),
-            report=lambda: line.show(summary(station, explain)),
+            report=lambda: line.show(summary(station, explain, outputs())),
             until=until,
         )
         asyncio.run(serving)
@@ -199,10 +210,14 @@ def gimbal_for(args: argparse.Namespace, stabiliser: Stabiliser | None = None) -
 def open_heads(
     specs: Sequence[str], gimbal: Callable[[], Gimbal], opened: contextlib.ExitStack
 ) -> dict[str, Head]:
-    """Heads by name: the tracker's kind, numbered from the second of a kind on."""
+    """Heads by name: as given (NAME=KIND:...), else the tracker's kind, numbered from the second
+    of a name on."""
     heads: dict[str, Head] = {}
-    for spec in specs:
-        name = _free_name(spec.partition(":")[0].partition("?")[0], heads)
+    for text in specs:
+        match = NAMED.fullmatch(text)
+        assert match is not None  # it takes anything
+        given, spec = match.groups()
+        name = _free_name(given or spec.partition(":")[0].partition("?")[0], heads)
         heads[name] = Head(name, open_tracker(spec), gimbal())
         opened.callback(heads[name].close)
     return heads
@@ -230,7 +245,7 @@ def announce(door: Door, open_browser: bool, *, webrtc: bool = True) -> None:
         threading.Thread(target=webbrowser.open, args=(door.urls[-1],), daemon=True).start()
 
 
-def summary(station: Station, explain: Callable[[str], str]) -> str:
+def summary(station: Station, explain: Callable[[str], str], outputs: str = "") -> str:
     """The station's state in one line."""
     status = station.status()
     source = status["source"]
@@ -242,7 +257,7 @@ def summary(station: Station, explain: Callable[[str], str]) -> str:
     if vehicle["mode"] != "body":
         parts += [f"mode {vehicle['mode']}", vehicle["message"], vehicle["offset"]]
     viewers = status["viewers"]
-    parts.append(f"{viewers} viewer{'' if viewers == 1 else 's'}")
+    parts += [f"{viewers} viewer{'' if viewers == 1 else 's'}", outputs]
     return "; ".join(filter(None, parts))
 
 

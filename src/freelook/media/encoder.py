@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import Any
+from typing import Any, Literal
 
 import av
+from av.error import FFmpegError
 from av.video.codeccontext import VideoCodecContext
 from av.video.frame import PictureType
 from av.video.reformatter import ColorRange, Colorspace
 
 from ..errors import RenderError
 from ..types import AccessUnit, ColorSpace, Frame, Picture, StreamInfo
+from . import hardware
 from .planes import av_from_picture
+
+By = Literal["auto", "software", "hardware"]
 
 LIBRARIES = {"h264": "libx264", "hevc": "libx265"}
 CODEC_NAMES = {"h264": "h264", "h265": "hevc", "hevc": "hevc"}
@@ -29,6 +33,9 @@ class Encoder:
     Annex B, with parameter sets on every key picture (one a second, or when asked for). The
     stream states its colour matrix and range. `codec` is h264 or h265 (hevc); `bitrate` is in
     bits per second. Only even sizes: the chroma of 4:2:0 needs them. RenderError otherwise.
+
+    `by` is software, hardware (RenderError where none works), or auto: hardware where it works
+    (`freelook.media.hardware`). `library` is FFmpeg's name of what encodes.
     """
 
     def __init__(
@@ -39,6 +46,7 @@ class Encoder:
         fps: float = 30,
         bitrate: int | None = None,
         color: ColorSpace = ColorSpace(),  # noqa: B008 - frozen
+        by: By = "software",
     ) -> None:
         if codec not in CODEC_NAMES:
             raise RenderError(f"unknown codec '{codec}'; known: {', '.join(CODEC_NAMES)}")
@@ -50,6 +58,7 @@ class Encoder:
             raise RenderError(f"frames per second must lie above 0 and up to 1000, not {fps}")
         self.size, self.codec, self.fps, self.color = size, CODEC_NAMES[codec], fps, color
         self.bitrate = bitrate or int(BITS_PER_PIXEL * size[0] * size[1] * fps)
+        self.library = self._choose(by)
         self._context = self._make_context()
         self._count = 0
 
@@ -65,28 +74,48 @@ class Encoder:
                 f"but this frame has {width} x {height}"
             )
         picture = encodable(frame.picture, self.color)
+        if self._context.pix_fmt != picture.format.name:
+            picture = picture.reformat(format=self._context.pix_fmt)
         picture.pts = self._count
         picture.time_base = self._context.time_base
         picture.pict_type = PictureType.I if key else PictureType.NONE
         self._count += 1
-        return [self._unit(packet, frame) for packet in self._context.encode(picture)]
+        try:
+            packets = self._context.encode(picture)
+        except FFmpegError as error:  # the hardware went away
+            hardware.gave_up(self.library)
+            raise RenderError(f"{self.library} failed: {error.strerror}") from None
+        return [self._unit(packet, frame) for packet in packets]
+
+    def _choose(self, by: By) -> str:
+        if by != "software" and (found := hardware.working(self.codec, self.size)):
+            return found
+        if by == "hardware":
+            raise RenderError(
+                f"no hardware encodes {self.codec} of {self.size[0]} x {self.size[1]} pixels "
+                "here; leave out encoder=hardware, or ask freelook doctor"
+            )
+        return LIBRARIES[self.codec]
 
     def _unit(self, packet: av.Packet[Any], frame: Frame) -> AccessUnit:
         info = StreamInfo(self.codec, *self.size, pixel_format="yuv420p")
         return AccessUnit(info, bytes(packet), packet.is_keyframe, frame.capture_ns, frame.media_ns)
 
     def _make_context(self) -> VideoCodecContext:
-        context = av.CodecContext.create(LIBRARIES[self.codec], "w")
+        context = av.CodecContext.create(self.library, "w")
         assert isinstance(context, VideoCodecContext)
         context.width, context.height = self.size
-        context.pix_fmt = "yuv420p"
+        context.pix_fmt = hardware.pixel_format(self.library)
         rate = Fraction(self.fps).limit_denominator(1001)
         context.framerate, context.time_base = rate, 1 / rate
         context.bit_rate = self.bitrate
         context.gop_size = max(1, round(KEY_INTERVAL_S * self.fps))
         context.thread_count = 1  # slices or frame threads would cost delay
         set_color(context, self.color)
-        context.options = low_delay_options(self.codec, context.gop_size, self.bitrate)
+        if self.library == LIBRARIES[self.codec]:
+            context.options = low_delay_options(self.codec, context.gop_size, self.bitrate)
+        else:
+            context.options = hardware.options(self.library)
         return context
 
 

@@ -2,7 +2,9 @@
 
 A sink module has a one-line docstring (its row in the documentation), `KIND`, and two functions:
 `recognises(argument)` says whether this is one of its own, and `open(argument, settings)` makes
-the sink. Opening checks what can be checked at once, such as a file that is there already.
+the sink. Opening checks what can be checked at once, such as a file that is there already. A sink
+that is opened only with the first picture may have `check(argument, settings)` too, and one that
+writes more than pictures `note(facts)`, called before each `write` with where the view looks.
 """
 
 from __future__ import annotations
@@ -11,10 +13,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
+from typing import Literal
 
 from ..errors import SinkError
 from ..plugins import modules_by_kind
 from ..types import ColorSpace, Sink
+
+By = Literal["auto", "software", "hardware"]
 
 
 @dataclass(frozen=True)
@@ -29,6 +34,7 @@ class SinkSettings:
     audio_from   a recording whose sound is copied, at its own times
     sdp          a file to write the description of a live stream to
     bitrate      bits per second of a live stream; None: by the size
+    encoder      of a live stream: auto, software or hardware (`freelook.media.encoder`)
     """
 
     size: tuple[int, int]
@@ -39,6 +45,7 @@ class SinkSettings:
     audio_from: str | None = None
     sdp: str | None = None
     bitrate: int | None = None
+    encoder: By = "auto"
 
 
 def modules() -> dict[str, ModuleType]:
@@ -57,16 +64,25 @@ def open_sink(
     audio_from: str | None = None,
     sdp: str | None = None,
     bitrate: int | None = None,
+    encoder: By = "auto",
 ) -> Sink:
     """The sink that an argument names: a file, an address, or `KIND:ARGUMENT`.
 
     The settings are those of `SinkSettings`. SinkError when the argument means nothing here or
     the output cannot be opened.
     """
-    settings = SinkSettings(size, fps, color, codec, overwrite, audio_from, sdp, bitrate)
+    settings = SinkSettings(size, fps, color, codec, overwrite, audio_from, sdp, bitrate, encoder)
     module, argument = find(argument)
     sink: Sink = module.open(argument, settings)
     return sink
+
+
+def check_sink(argument: str, settings: SinkSettings) -> None:
+    """SinkError for what is known to be wrong before anything is opened: each module may have a
+    `check(argument, settings)`."""
+    module, argument = find(argument)
+    if check := getattr(module, "check", None):
+        check(argument, settings)
 
 
 def find(argument: str) -> tuple[ModuleType, str]:

@@ -5,13 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import cv2
-import numpy as np
-from numpy.typing import NDArray
 
-from ..color import chroma_planes, rgb_from_yuv, to_codes
 from ..errors import SinkError
-from ..types import Frame, Picture, Plane, Sink
+from ..types import Frame, Picture, Sink
 from . import SinkSettings, check_output_file, refuse
+from ._rgb import rgb24 as rgb24
 
 KIND = "picture"
 
@@ -55,22 +53,3 @@ def write_picture(path: Path, picture: Picture) -> None:
         path.write_bytes(data.tobytes())
     except OSError as error:
         raise SinkError(f"{path}: {error.strerror}") from None
-
-
-def rgb24(picture: Picture) -> Plane:
-    """(height, width, 3) of any picture; chroma is interpolated between its samples."""
-    luma = picture.planes[0]
-    if picture.layout == "rgb24":
-        return luma
-    yuv = np.full((*luma.shape, 3), 128.0)
-    yuv[..., 0] = luma
-    if picture.layout != "gray":
-        u, v = chroma_planes(picture)
-        yuv[..., 1], yuv[..., 2] = _doubled(u, luma.shape), _doubled(v, luma.shape)
-    return to_codes(255 * rgb_from_yuv(yuv, picture.color))
-
-
-def _doubled(plane: Plane, shape: tuple[int, ...]) -> NDArray[np.float32]:
-    wide = (plane.shape[1] * 2, plane.shape[0] * 2)
-    doubled = cv2.resize(plane.astype(np.float32), wide, interpolation=cv2.INTER_LINEAR)
-    return np.asarray(doubled[: shape[0], : shape[1]])

@@ -39,6 +39,12 @@ def recognises(argument: str) -> bool:
     return "://" not in argument and argument.lower().endswith(SUFFIXES)
 
 
+def check(argument: str, settings: SinkSettings) -> None:
+    if not recognises(argument):
+        raise SinkError(f"{argument}: a video file ends in {', '.join(SUFFIXES)}")
+    check_output_file(argument, overwrite=settings.overwrite)
+
+
 def open(argument: str, settings: SinkSettings) -> Sink:
     refuse(settings, "a video file", "sdp", "bitrate")
     return VideoFile(argument, settings)
