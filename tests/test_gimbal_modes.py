@@ -383,3 +383,37 @@ def test_eyes_front_disable_and_a_dead_tracker_look_along_the_nose_in_every_mode
             assert (
                 aim.state == {"eyes_front": "front", "disable": "disabled", None: "centred"}[latch]
             )
+
+
+TIMES_MS = st.integers(-2000, 20_000)
+HAPPENINGS = st.one_of(
+    st.tuples(st.just("attitude"), TIMES_MS, st.integers(0, 2**32 - 1)),
+    st.tuples(st.just("ask"), TIMES_MS, TIMES_MS),
+    st.tuples(st.just("offset"), TIMES_MS, st.just(0)),
+    st.tuples(st.just("position"), TIMES_MS, st.integers(-90, 90)),
+    st.tuples(st.sampled_from(MODES), st.just(0), st.just(0)),
+)
+
+
+@given(st.lists(HAPPENINGS, max_size=25))
+def test_whatever_it_is_told_and_asked_it_answers_with_a_rotation(
+    happenings: list[tuple[str, int, int]],
+) -> None:
+    """Times forward and back, attitudes from nowhere, frames from before and to come."""
+    stabiliser = Stabiliser()
+    stabiliser.set_mode("point", Location(0.1, 0.1, 10))
+    for what, first, second in happenings:
+        t_ns = first * NS_PER_MS
+        if what == "attitude":
+            stabiliser.push(Attitude(t_ns, Rotation.random(rng=np.random.default_rng(second))))
+        elif what == "ask":
+            base = stabiliser.at(t_ns, second * NS_PER_MS)
+            assert np.linalg.norm(base.body_from_base.as_quat()) == pytest.approx(1)
+            assert base.effective in (base.mode, "body")
+            assert bool(base.notice) >= (base.effective != base.mode), "never without a word"
+        elif what == "offset":
+            stabiliser.set_offset(t_ns)
+        elif what == "position":
+            stabiliser.push_position(Location(second, second, first), t_ns)
+        else:
+            stabiliser.set_mode(what)

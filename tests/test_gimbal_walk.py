@@ -7,8 +7,10 @@ each change that is being eased: one of the head's, one of the stabiliser's. Onl
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -27,6 +29,7 @@ from freelook.gimbal import (
     StabiliserSettings,
     parse_shape,
 )
+from freelook.gimbal.core import LEAST_JUMP_DEG
 from freelook.rotations import body_from_view
 from freelook.types import Attitude, Pose
 
@@ -189,6 +192,30 @@ EVENTS = (
 
 def test_there_is_a_way_to_every_state() -> None:
     assert set(WAYS) == set(STATES)
+
+
+def test_the_documentation_has_every_state_mode_and_number() -> None:
+    page = (Path(__file__).parent.parent / "docs" / "gimbal.md").read_text("utf-8")
+    words = " ".join(page.split())
+    head, vehicle = GimbalSettings(), StabiliserSettings()
+    for state in STATES:
+        assert re.search(rf"\b{state}\b", page), state
+    for mode in MODES:
+        assert f"| `{mode}` |" in page
+    for text in (
+        f"no pose for {head.lost_after_s:g} s",
+        f"{head.hold_s:g} s, --hold",
+        f"{head.ease_s:g} s or more,",
+        f"at least {head.blend_s:g} s (modes: {vehicle.blend_s:g} s)",
+        f"**{head.rate_deg_s:g} degrees a second**",
+        f"more than {LEAST_JUMP_DEG:g} degrees from the one before",
+        f"at {head.jump_deg_s:g} degrees a second, is no turn but a jump",
+        f"faster than {vehicle.jump_deg_s:g} degrees a second jumped",
+        f"back for {vehicle.settle_s:g} s",
+        f"time constant {vehicle.follow_s:g} s",
+    ):
+        assert text in words, text
+    assert head.rate_deg_s == vehicle.rate_deg_s
 
 
 @pytest.mark.parametrize("state", STATES)
