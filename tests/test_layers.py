@@ -13,7 +13,17 @@ PACKAGE = Path(freelook.__file__).parent
 
 LAYERS: list[set[str]] = [
     {"types", "errors", "clock"},
-    {"lens", "camera", "viewport", "rotations", "mailbox", "axes", "pose_script", "attitude"}
+    {
+        "lens",
+        "camera",
+        "projections",
+        "viewport",
+        "rotations",
+        "mailbox",
+        "axes",
+        "pose_script",
+        "attitude",
+    }
     | {"attitude_track", "rate_integration"}
     | {"color", "datagrams", "latency", "plugins"},
     {"renderers", "gimbal", "prediction", "simulation", "media", "fitting", "plots", "calibration"}

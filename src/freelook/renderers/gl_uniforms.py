@@ -34,7 +34,11 @@ def camera_uniforms(camera: Camera) -> dict[str, Value]:
 
 
 def view_defines(viewport: Viewport) -> set[str]:
-    return set()
+    """The formula of its rays; none for a perspective view."""
+    if viewport.kind.cut:
+        return {"CUT"}
+    formula = viewport.kind.formula
+    return set() if formula == "perspective" else {formula.upper()}
 
 
 def view_uniforms(viewport: Viewport, camera_from_view: Rotation) -> dict[str, Value]:
@@ -58,6 +62,9 @@ def color_uniforms(color: ColorSpace) -> dict[str, Value]:
 def most_shrunk(camera: Camera, viewport: Viewport) -> float:
     """Picture pixels per view pixel, at most, wherever the camera may look: an estimate from
     above, from where the lens is finest and where the view is coarsest."""
+    if viewport.kind.cut:  # one focal length is one of the lens
+        per_px = float(camera.table.g[0]) / 2 / viewport.focal_px
+        return per_px * float(np.linalg.norm(camera.stretch, 2))
     return _finest_px_per_rad(camera) * _coarsest_rad_per_px(viewport)
 
 

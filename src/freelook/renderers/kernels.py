@@ -95,12 +95,20 @@ def project_nodes(
         if formula == PERSPECTIVE:  # a loop of its own, as fast as it can be
             for column in range(nodes.shape[2]):
                 x = (f32((column - 1) * step) - cx) / focal
-                set_node(nodes[:, row, column], r, x, y, f32(1), g, per_place, far)
+                dx = r[0, 0] * x + r[0, 1] * y + r[0, 2]
+                dy = r[1, 0] * x + r[1, 1] * y + r[1, 2]
+                dz = r[2, 0] * x + r[2, 1] * y + r[2, 2]
+                u, v, t = round_image(dx, dy, dz, g, per_place, far)
+                nodes[0, row, column], nodes[1, row, column], nodes[2, row, column] = u, v, t
         else:
             for column in range(nodes.shape[2]):
                 x = (f32((column - 1) * step) - cx) / focal
                 rx, ry, rz = view_ray(formula, x, y)
-                set_node(nodes[:, row, column], r, rx, ry, rz, g, per_place, far)
+                dx = r[0, 0] * rx + r[0, 1] * ry + r[0, 2] * rz
+                dy = r[1, 0] * rx + r[1, 1] * ry + r[1, 2] * rz
+                dz = r[2, 0] * rx + r[2, 1] * ry + r[2, 2] * rz
+                u, v, t = round_image(dx, dy, dz, g, per_place, far)
+                nodes[0, row, column], nodes[1, row, column], nodes[2, row, column] = u, v, t
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
@@ -117,12 +125,11 @@ def view_ray(formula: int, x: Any, y: Any) -> tuple[Any, Any, Any]:
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True, inline="always")
-def set_node(node: F32, r: F32, x: Any, y: Any, z: Any, g: F32, per_place: Any, far: Any) -> None:
-    """A node (x, y, t) from its ray (x, y, z) in the view frame."""
+def round_image(
+    dx: Any, dy: Any, dz: Any, g: F32, per_place: Any, far: Any
+) -> tuple[Any, Any, Any]:
+    """x and y in the round image, from the axis, and t, of a ray in the camera frame."""
     f32 = np.float32
-    dx = r[0, 0] * x + r[0, 1] * y + r[0, 2] * z
-    dy = r[1, 0] * x + r[1, 1] * y + r[1, 2] * z
-    dz = r[2, 0] * x + r[2, 1] * y + r[2, 2] * z
     length = np.sqrt(dx * dx + dy * dy + dz * dz)
     inverse = f32(1) / max(length + dz, f32(1e-6) * length)
     px, py = dx * inverse, dy * inverse
@@ -131,7 +138,7 @@ def set_node(node: F32, r: F32, x: Any, y: Any, z: Any, g: F32, per_place: Any, 
         shrink = np.sqrt(far / t)
         px, py, t = px * shrink, py * shrink, far
     gain = look_up(g, (np.sqrt(t) + t) * per_place)
-    node[0], node[1], node[2] = px * gain, py * gain, t
+    return px * gain, py * gain, t
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)

@@ -12,6 +12,9 @@
 //   #define ANTIALIAS     more samples where the view shrinks the picture
 //   #define BICUBIC       sharper than bilinear where it enlarges
 //   #define VIEWER        makes up for the lens of a viewer in front of the screen
+//   #define PANNINI       or STEREOGRAPHIC, CYLINDRICAL, EQUIRECTANGULAR: the view's projection
+//                         (none: perspective)
+//   #define CUT           a window of the picture as it is, instead of a projection
 //
 // Pixels: (0, 0) is the middle of the top-left one. The projection is defined in camera.py.
 
@@ -200,6 +203,50 @@ vec2 offset_at(vec2 p) {
 #endif
 }
 
+// The ray through a place of the view, counted from its middle in focal lengths. The definition
+// is in projections.py.
+vec3 view_ray(vec2 place) {
+    float x = place.x, y = place.y;
+#if defined(PANNINI)
+    return vec3(x, y, 1.0 - x * x / 4.0);
+#elif defined(STEREOGRAPHIC)
+    return vec3(x, y, 1.0 - (x * x + y * y) / 4.0);
+#elif defined(CYLINDRICAL)
+    return vec3(sin(x), y, cos(x));
+#elif defined(EQUIRECTANGULAR)
+    return vec3(sin(x) * cos(y), sin(y), cos(x) * cos(y));
+#else
+    return vec3(x, y, 1.0);
+#endif
+}
+
+// A ray in the camera frame by its stereographic coordinate, and t.
+vec2 stereographic(vec3 ray, out float t) {
+    float size = length(ray);
+    float depth = max(size + ray.z, 1e-5 * size);  // 0 straight behind, where no lens sees
+    vec2 p = ray.xy / depth;
+    t = ray.z > 0.0 ? dot(p, p) : (size - ray.z) / depth;  // the same; each where exact
+    return p;
+}
+
+#ifdef CUT
+// The place in the round image, and in place of t what is as large on the rim.
+vec2 round_image(vec2 place, out float t) {
+    vec2 ahead = stereographic(camera_from_view[2], t);
+    if (t > lens_t_max) ahead = length(ahead) > 1e-6 ? normalize(ahead) : vec2(1.0, 0.0);
+    if (t > lens_t_max) ahead *= sqrt(lens_t_max);
+    vec2 middle = ahead * g_at(dot(ahead, ahead)) + offset_at(ahead);
+    vec2 point = middle + 0.5 * g_at(0.0) * place;
+    t = dot(point, point) / (g_at(lens_t_max) * g_at(lens_t_max));
+    return point;
+}
+#else
+vec2 round_image(vec2 place, out float t) {
+    vec2 p = stereographic(camera_from_view * view_ray(place), t);
+    return p * g_at(t) + offset_at(p);
+}
+#endif
+
 // Where the view is shown at `here`, so that a viewer's lens brings it back to its place.
 vec2 through_viewer(vec2 here) {
 #ifdef VIEWER
@@ -214,12 +261,8 @@ vec2 through_viewer(vec2 here) {
 void main() {
     vec2 here = pixel_from_fragment.xy * gl_FragCoord.xy + pixel_from_fragment.zw;
     here = through_viewer(here);
-    vec3 ray = camera_from_view * vec3((here - view_center) / view_focal_px, 1.0);
-    float size = length(ray);
-    float depth = max(size + ray.z, 1e-5 * size);  // 0 straight behind, where no lens sees
-    vec2 p = ray.xy / depth;
-    float t = ray.z > 0.0 ? dot(p, p) : (size - ray.z) / depth;  // the same; each where exact
-    vec2 pixel = lens_center + lens_stretch * (p * g_at(t) + offset_at(p));
+    float t;
+    vec2 pixel = lens_center + lens_stretch * round_image((here - view_center) / view_focal_px, t);
 #ifdef PLANE
     pixel = in_plane(pixel, plane_scale);
 #endif
