@@ -170,6 +170,18 @@ def test_the_soft_stop_can_be_chosen(view: PageView) -> None:
     view.until("Math.abs(freelook.stats().angles.yaw - 10) < 1e-6")
 
 
+SCALED = "q => freelook.app.phone.scaled(q)"
+
+
+def test_the_phone_has_gain_dead_zone_and_sense_of_each_axis(view: PageView) -> None:
+    settings = {"yaw.dead": 5, "yaw.scale": 2, "pitch.invert": True, "roll.dead": 20}
+    for name, value in settings.items():
+        view.js("([n, v]) => freelook.app.settings.set(`phone.${n}`, v)", [name, value])
+    q = view.js(SCALED, to_wxyz(RDF_FROM_FRD * body_from_view(-30, 12, 15)))
+    expected = to_wxyz(RDF_FROM_FRD * body_from_view(-50, -12, 0))
+    assert abs(np.dot(q, expected)) == pytest.approx(1, abs=1e-9)
+
+
 def test_zoom_ends_where_the_cameras_pixels_only_grow(open_page: Any, page_station: Any) -> None:
     camera = make_camera((320, 240), Equidistant(f=70.0), field_deg=140)
     page_station.zoom = messages.zoom(camera)

@@ -6,7 +6,9 @@ import { INPUTS } from './settings.js';
  * @param {string[]} modes @param {(mode: string) => void} setMode */
 export function fillPanel(form, settings, modes, setMode) {
   const rows = Object.entries(INPUTS).map(([input, { title, axes }]) =>
-    fieldset(title, axes.map((axis) => axisRow(settings, input, axis))));
+    fieldset(title, axes.flatMap((axis) => (input === 'phone'
+      ? [axisRow(settings, input, axis), deadZoneRow(settings, input, axis)]
+      : [axisRow(settings, input, axis)]))));
   rows[0].append(choice(settings, 'dragMoves', 'Dragging moves',
     [['picture', 'the picture'], ['head', 'the head']]));
   rows[2].append(choice(settings, 'stick', 'Right stick gives',
@@ -57,6 +59,22 @@ function axisRow(settings, input, axis) {
   inverted.append(invert, ' invert');
   const row = element('div', { className: 'row' });
   row.append(element('span', { textContent: axis }), scale, shown, inverted);
+  return row;
+}
+
+/** @param {import('./settings.js').Settings} settings @param {string} input @param {string} axis */
+function deadZoneRow(settings, input, axis) {
+  const dead = element('input', {
+    type: 'range', min: '0', max: '20', step: '0.5',
+    value: String(settings.deadZone(input, axis)), ariaLabel: `${axis} dead zone`,
+  });
+  const shown = element('output', { textContent: `${dead.value}°` });
+  dead.addEventListener('input', () => {
+    settings.set(`${input}.${axis}.dead`, Number(dead.value));
+    shown.textContent = `${dead.value}°`;
+  });
+  const row = element('div', { className: 'row' });
+  row.append(element('span', { textContent: `${axis}: still within` }), dead, shown);
   return row;
 }
 

@@ -86,9 +86,15 @@ export class PhoneHead {
 
   /** @param {Quaternion} q @returns {Quaternion} */
   scaled(q) {
-    const [yaw, pitch, roll] = ['yaw', 'pitch', 'roll'].map((axis) => this.settings.gain('phone', axis));
-    if (yaw === 1 && pitch === 1 && roll === 1) return q;
+    const axes = /** @type {const} */ (['yaw', 'pitch', 'roll']);
+    const plain = axes.every((axis) =>
+      this.settings.gain('phone', axis) === 1 && !this.settings.deadZone('phone', axis));
+    if (plain) return q;
     const angles = toAngles(q);
-    return fromAngles({ yaw: angles.yaw * yaw, pitch: angles.pitch * pitch, roll: angles.roll * roll });
+    for (const axis of axes) {
+      const beyond = Math.max(0, Math.abs(angles[axis]) - this.settings.deadZone('phone', axis));
+      angles[axis] = Math.sign(angles[axis]) * beyond * this.settings.gain('phone', axis);
+    }
+    return fromAngles(angles);
   }
 }

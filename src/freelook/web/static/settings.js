@@ -48,6 +48,12 @@ export class Settings {
     return sign * (Number.isFinite(scale) ? scale : 1);
   }
 
+  /** Degrees that a head may turn before the view does. @param {string} input @param {string} axis */
+  deadZone(input, axis) {
+    const degrees = Number(this.values[`${input}.${axis}.dead`] ?? 0);
+    return Number.isFinite(degrees) ? Math.max(0, degrees) : 0;
+  }
+
   reset() {
     this.values = { ...this.usual };
     this.storage?.removeItem(KEY);
