@@ -7,8 +7,6 @@ slower than `cpu`.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -21,6 +19,7 @@ from .gl_context import open_context
 from .gl_painter import Painter
 from .gl_picture import UNITS, components
 from .gl_shader import Value
+from .gl_target import Targets
 
 # From gl_FragCoord to pixels of what is read back with its first row on top.
 FROM_TOP = (1.0, 1.0, -0.5, -0.5)
@@ -39,15 +38,14 @@ class GlRenderer:
     ) -> None:
         self._context = open_context(device)
         self.name = str(self._context.info["GL_RENDERER"])
-        self._targets: dict[tuple[int, int, int, str], Any] = {}
-        self._stores: list[Any] = []  # their textures
         with self._context:
             self._painter = Painter(self._context, sampling, antialias)
+            self._targets = Targets(self._context)
 
     def close(self) -> None:
         """Give the GPU's memory back; nothing can be rendered after it."""
         with self._context:
-            self._forget_targets()
+            self._targets.release()
         self._context.release()  # and with it all that it knows
 
     def render(
@@ -56,15 +54,20 @@ class GlRenderer:
         with self._context:
             self._painter.load(picture, camera, viewport)
             self._painter.picture.bind()
-            view = []
-            kinds = zip(picture.planes, plane_scales(picture), black_of(picture), strict=True)
-            for unit, (plane, scale, black) in zip(UNITS, kinds, strict=False):
-                self._use(viewport.size, scale, components(plane))
-                self._painter.paint_plane(
-                    camera, camera_from_view, viewport, **_of_plane(unit, scale, black)
+            drawn = []
+            for number, (plane, scale, black) in enumerate(
+                zip(picture.planes, plane_scales(picture), black_of(picture), strict=True)
+            ):
+                drawn.append(
+                    self._targets.used(
+                        viewport.size, number=number, scale=scale, count=components(plane)
+                    )
                 )
-                view.append(self._read(np.uint8))
-        return Picture(picture.layout, tuple(view), picture.color)
+                uniforms = _of_plane(UNITS[number], scale, black)
+                self._painter.paint_plane(camera, camera_from_view, viewport, **uniforms)
+            # all are asked for before the first is waited for
+            planes = tuple(target.read() for target in drawn)
+        return Picture(picture.layout, planes, picture.color)
 
     def render_rgb(
         self, picture: Picture, camera: Camera, camera_from_view: Rotation, viewport: Viewport
@@ -72,10 +75,10 @@ class GlRenderer:
         """The view as a screen shows it, rgb24: the colour is made in the shader."""
         with self._context:
             self._painter.load(picture, camera, viewport)
-            self._use(viewport.size, 1, 3)
+            target = self._targets.used(viewport.size, count=3)
             more: dict[str, Value] = {"pixel_from_fragment": FROM_TOP}
             self._painter.paint(camera, camera_from_view, viewport, **more)
-            return Picture("rgb24", (self._read(np.uint8),), picture.color)
+            return Picture("rgb24", (target.read(),), picture.color)
 
     def coordinates(
         self, camera: Camera, camera_from_view: Rotation, viewport: Viewport
@@ -83,37 +86,13 @@ class GlRenderer:
         """Where each view pixel looks, as rendered: float32 (2, height, width); NaN where the
         lens does not see. There must be a picture, which says how large pictures are."""
         with self._context:
-            self._use(viewport.size, 1, 4, "f4")
+            target = self._targets.used(viewport.size, count=4, kind="f4")
             more: dict[str, Value] = {"pixel_from_fragment": FROM_TOP}
             self._painter.paint_coordinates(camera, camera_from_view, viewport, **more)
-            values = self._read(np.float32)
+            values = target.read()
         pixels = np.ascontiguousarray(np.moveaxis(values[..., :2], -1, 0))
         pixels[:, values[..., 2] > camera.table.t_max] = np.nan
         return pixels
-
-    def _use(self, size: tuple[int, int], scale: int, count: int, kind: str = "f1") -> None:
-        """Draw into a target for a plane `scale` times smaller than the view."""
-        width, height = -(-size[0] // scale), -(-size[1] // scale)
-        key = (width, height, count, kind)
-        if key not in self._targets:
-            if len(self._targets) > 8:  # views of ever new sizes
-                self._forget_targets()
-            texture = self._context.texture((width, height), count, dtype=kind)
-            self._targets[key] = self._context.framebuffer([texture])
-            self._stores.append(texture)
-        self._key = key
-        self._targets[key].use()
-
-    def _forget_targets(self) -> None:
-        for gone in (*self._targets.values(), *self._stores):
-            gone.release()
-        self._targets, self._stores = {}, []
-
-    def _read(self, dtype: Any) -> Any:
-        width, height, count, kind = self._key
-        values = np.empty((height, width, count) if count > 1 else (height, width), dtype)
-        self._targets[self._key].read_into(values, components=count, alignment=1, dtype=kind)
-        return values
 
 
 def _of_plane(unit: int, scale: int, black: int) -> dict[str, Value]:
