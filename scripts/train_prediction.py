@@ -44,16 +44,16 @@ from freelook.types import Pose
 Floats = NDArray[np.float32]
 
 AHEAD_S = np.array([0.02, 0.035, 0.05, 0.075, 0.1, 0.15])
-WEIGHT_OF_AHEAD = np.array([1.0, 0.5, 1.0, 0.5, 1.0, 0.5]) / 4.5
+WEIGHT_OF_AHEAD = np.array([1.0, 0.5, 1.5, 0.5, 1.0, 0.5]) / 5.0
 PACES = (0.8, 0.9, 1.0, 1.1, 1.25)
 WARM_UP = 40
 
 HIDDEN = (48, 32)
-STEPS = 800
+STEPS = 1500
 BATCH = 3072
 RATE = 3e-3
 NOISE = 0.3
-DECAY = 1e-3
+DECAY = 1e-4
 SHARPNESS = (0.5, 0.15)
 HUBER = 0.15
 LEAST_SPEED_DEG_S = 10.0 + SLOW_DEG_S  # slower ones never are among the 5 %
@@ -232,7 +232,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("files", nargs="+", type=Path, metavar="FILE")
     parser.add_argument("--check", action="store_true", help="predict each from the others")
-    parser.add_argument("--members", type=int, default=4, metavar="N", help="networks to average")
+    parser.add_argument("--members", type=int, default=8, metavar="N", help="networks to average")
     args = parser.parse_args()
     by_file = []
     for path in args.files:

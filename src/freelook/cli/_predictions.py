@@ -89,8 +89,8 @@ def _print_errors(rows: list[Row]) -> None:
     for recording in dict.fromkeys(row.recording for row in rows):
         table = Table(title=f"{recording}: error in degrees")
         table.add_column("ahead")
-        table.add_column("predictor")
-        for column in ("p50", "p95", "p99", "p95 below constant rate"):
+        table.add_column("predictor", no_wrap=True)
+        for column in ("p50", "p95", "p99", "p95 against constant rate"):
             table.add_column(column, justify="right")
         for row in sorted(
             (row for row in rows if row.recording == recording), key=lambda row: row.horizon_ms
@@ -100,7 +100,7 @@ def _print_errors(rows: list[Row]) -> None:
                 f"{row.horizon_ms:g} ms",
                 row.predictor,
                 *(f"{error:.2f}" for error in row.errors_deg.values()),
-                "" if row.predictor == BASE else f"{below:.1f} %",
+                "" if row.predictor == BASE else f"{-below:+.1f} %",
             )
         Console().print(table)
 
@@ -112,17 +112,18 @@ def _print_still(jitter: dict[str, dict[str, float]], lag: dict[str, dict[str, f
     from ..bench.predict import STILL_NOISE_DEG, STILL_RATE_HZ
 
     table = Table(
-        title=f"still head, noise {STILL_NOISE_DEG:g} deg rms per axis at {STILL_RATE_HZ:g} Hz"
+        title="shaking of a still head's view, deg rms, "
+        f"for noise of {STILL_NOISE_DEG:g} deg rms per axis at {STILL_RATE_HZ:g} Hz"
     )
-    table.add_column("predictor")
+    table.add_column("predictor", no_wrap=True)
     first = next(iter(jitter.values()))
     for ahead in first:
-        table.add_column(f"{ahead} ms ahead, deg rms", justify="right")
+        table.add_column(f"{ahead} ms ahead", justify="right")
     for name, row in jitter.items():
         table.add_row(name, *(f"{value:.3f}" for value in row.values()))
     Console().print(table)
     table = Table(title="how late smoothing makes the present, ms")
-    table.add_column("predictor")
+    table.add_column("predictor", no_wrap=True)
     for speed in next(iter(lag.values())):
         table.add_column(f"{speed} deg/s", justify="right")
     for name, row in lag.items():
