@@ -22,8 +22,8 @@ from freelook.gimbal import (
     StabiliserSettings,
     parse_target,
 )
+from freelook.gimbal.base import level
 from freelook.gimbal.headings import Heading, nose
-from freelook.gimbal.stabiliser import level
 from freelook.gimbal.targets import direction_to
 from freelook.rotations import angle_between_deg, body_from_view, head_angles_deg
 from freelook.types import Attitude, Pose

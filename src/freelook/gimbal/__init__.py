@@ -5,11 +5,12 @@
 `zoom` sensible fields of view.
 """
 
+from .base import BODY, MODES, Base
 from .core import CENTRE, Aim, Gimbal
 from .limits import LIMITS, LensLimit, soft_stop
 from .settings import GimbalSettings, StabiliserSettings
 from .shaping import AxisShape, Shape, parse_shape
-from .stabiliser import BODY, MODES, Base, Stabiliser
+from .stabiliser import Stabiliser
 from .targets import Direction, Location, parse_target
 from .zoom import ZoomLimits, most_focal_px, zoom_limits
 

@@ -37,10 +37,11 @@ from ..rotations import (
     head_angles_deg,
 )
 from ..types import Pose
+from .base import BODY, Base
 from .easing import LONG_AGO_NS, NOTHING, Blend, blend
 from .settings import GimbalSettings
 from .shaping import STRAIGHT, Angles
-from .stabiliser import BODY, Base, Stabiliser
+from .stabiliser import Stabiliser
 
 CENTRE: Rotation = FRD_FROM_RDF
 LEAST_JUMP_DEG = 15.0  # less than this in no time is noise, or poses that came in a heap

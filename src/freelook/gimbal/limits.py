@@ -11,6 +11,9 @@ Where the lens sees more than a half sphere, the middle of an edge of the view m
 its corners: the great circle of that edge, with the normal n, then comes as near as
 pi - theta_max to the direction straight behind, n . (-k) = sin(theta_max).
 
+Views of other projections have no such straight edges; their border is taken point by point, each
+as such a corner. A crop has no rays of its own: its middle may go as far as the edge.
+
 The least of these is the limit for this field of view, this side and this roll of the view. The
 last `KNEE` degrees before it are slowed down so that the limit is only reached in the limit:
 
@@ -21,24 +24,48 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from functools import lru_cache
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..camera import Camera
 from ..clock import NS_PER_S
+from ..lens import Floats
 from ..rotations import angle_between_deg
 from ..viewport import Viewport
 from .settings import RATE_DEG_S
 
 LIMITS = ("soft", "black")
 KNEE = math.radians(10.0)
+PER_SIDE = 33  # places on a side of a view; between them it may stray by a hundredth of a degree
 
 
 def half_sides(viewport: Viewport) -> tuple[float, float]:
     """How far the view's outer edges lie from its middle, on the plane z = 1."""
     width, height = viewport.size
     return width / 2 / viewport.focal_px, height / 2 / viewport.focal_px
+
+
+def reach_of(outward: tuple[float, float], viewport: Viewport, theta_max: float) -> float:
+    """As `reach`, for a view of any projection."""
+    if viewport.kind.cut:
+        return theta_max
+    if viewport.projection == "perspective":
+        return reach(outward, half_sides(viewport), theta_max)
+    across, depth = _border(viewport)
+    u = across @ np.array(outward)
+    cosine = np.cos(theta_max) / np.maximum(np.hypot(u, depth), 1e-9)
+    limits = np.arccos(np.clip(cosine, -1.0, 1.0)) - np.arctan2(u, depth)
+    return max(0.0, float(limits.min()))
+
+
+@lru_cache(maxsize=64)
+def _border(viewport: Viewport) -> tuple[Floats, Floats]:
+    """Unit rays round a view: their x and y (n, 2), and z (n,)."""
+    rays = viewport.border(PER_SIDE)
+    rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
+    return rays[:, :2], rays[:, 2]
 
 
 def reach(outward: tuple[float, float], sides: tuple[float, float], theta_max: float) -> float:
@@ -106,7 +133,7 @@ def soft_stop(
     away = math.hypot(x, y)
     outward = (-x / away, -y / away) if away > 1e-12 else (1.0, 0.0)
     theta = math.atan2(away, z)
-    kept = softened(theta, reach(outward, half_sides(viewport), theta_max), knee)
+    kept = softened(theta, reach_of(outward, viewport, theta_max), knee)
     if kept == theta:
         return camera_from_view
     # about the view's own axis across the outward direction

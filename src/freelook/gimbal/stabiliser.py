@@ -18,10 +18,9 @@ at once: the view stays, and eases to where it belongs.
 
 from __future__ import annotations
 
-import math
 import threading
 from bisect import bisect_right
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from scipy.spatial.transform import Rotation
 
@@ -30,43 +29,16 @@ from ..clock import NS_PER_S
 from ..errors import TrackerError
 from ..rotations import angle_between_deg
 from ..types import Attitude
+from .base import BODY, MODES, Base, level
 from .easing import LONG_AGO_NS, NOTHING, Blend, blend
 from .headings import Heading
 from .settings import StabiliserSettings
 from .targets import Direction, Location, Target, direction_to
 
-MODES = ("body", "horizon", "world", "follow", "point")
 LEAST_JUMP_DEG = 3.0  # less between two attitudes is noise, or a jitter of their times
 JOINED_S = 0.5  # attitudes farther apart than this say nothing about a jump
 JUMPS_KEPT = 1000
 LARGE_OFFSET_NS = 5_000_000  # at 100 degrees a second, half a degree
-
-
-@dataclass(frozen=True)
-class Base:
-    """What the stabiliser answers.
-
-    `mode` is the one that was asked for, `effective` the one that is: body when the other is not
-    possible, and `notice` says why. `moving`: a change is being eased. `turned`: not the body's
-    own axes.
-    """
-
-    body_from_base: Rotation = NOTHING
-    mode: str = "body"
-    effective: str = "body"
-    notice: str = ""
-    moving: bool = False
-    turned: bool = False
-
-    @property
-    def state(self) -> str:
-        """steady, easing or degraded."""
-        if self.effective != self.mode:
-            return "degraded"
-        return "easing" if self.moving else "steady"
-
-
-BODY = Base()
 
 
 class Stabiliser:
@@ -298,11 +270,3 @@ class Stabiliser:
         if now_ns - t_ns > self.settings.fresh_s * NS_PER_S:
             return None
         return direction_to(self._target, here)
-
-
-def level(heading_deg: float, elevation_deg: float = 0.0) -> Rotation:
-    """North, east, down from axes that head there without roll, the first one so far above the
-    horizon."""
-    yaw, pitch = math.radians(heading_deg) / 2, math.radians(elevation_deg) / 2
-    (sin_y, cos_y), (sin_p, cos_p) = ((math.sin(half), math.cos(half)) for half in (yaw, pitch))
-    return Rotation.from_quat([-sin_y * sin_p, cos_y * sin_p, sin_y * cos_p, cos_y * cos_p])

@@ -1,8 +1,9 @@
 """Sensible fields of view for a camera: not so narrow that there is nothing left to see, not so
 wide that the lens has nothing more to show.
 
-At the middle of a view of `width` pixels there are (width / 2) / tan(hfov / 2) pi / 180 view pixels
-to a degree; the camera has its own (`freelook.resolution`). A view may enlarge the camera's pixels
+At the middle of a perspective view of `width` pixels there are
+(width / 2) / tan(hfov / 2) pi / 180 view pixels to a degree, and as many with another projection
+(`freelook.projections`) in place of the tangent; the camera has its own (`freelook.resolution`). A view may enlarge the camera's pixels
 `MOST_ENLARGED` times; narrower fields would show the same blur, larger.
 """
 
@@ -14,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..camera import Camera
+from ..projections import projection_named
 from ..resolution import resolution_at
-from ..viewport import NARROWEST_DEG, WIDEST_DEG
 
 MOST_ENLARGED = 10.0
 
@@ -31,14 +32,16 @@ class ZoomLimits:
         return min(self.widest_deg, max(self.narrowest_deg, field_deg))
 
 
-def zoom_limits(camera: Camera, width_px: float) -> ZoomLimits:
+def zoom_limits(camera: Camera, width_px: float, projection: str = "perspective") -> ZoomLimits:
     """For views `width_px` across, by what the camera resolves on its axis.
 
-    Always within 10 and 150 degrees, and never narrower than wide.
+    Always within the projection's own limits, 10 and 150 degrees for perspective, and never
+    narrower than wide. RenderError for an unknown projection.
     """
-    field_deg = math.degrees(2 * math.atan(width_px / 2 / most_focal_px(camera)))
-    narrowest = max(NARROWEST_DEG, field_deg)
-    widest = max(NARROWEST_DEG, min(WIDEST_DEG, 2 * math.degrees(camera.theta_max)))
+    kind = projection_named(projection)
+    field_deg = 2 * kind.angle_deg(width_px / 2 / most_focal_px(camera), 0.0)
+    narrowest = max(kind.narrowest_deg, field_deg)
+    widest = max(kind.narrowest_deg, min(kind.widest_deg, 2 * math.degrees(camera.theta_max)))
     return ZoomLimits(min(narrowest, widest), widest)
 
 
