@@ -78,7 +78,10 @@ class ViewCost:
 def view_cost(
     camera: Camera, camera_from_view: Rotation, viewport: Viewport, *, columns: int = 240
 ) -> ViewCost:
-    """Measured on `columns` x rows samples of the view, on every pixel of a smaller one."""
+    """Measured on `columns` x rows samples of the view, on every pixel of a smaller one.
+
+    RenderError for a crop, whose pixels are the picture's own.
+    """
     place = places(*sample_places(viewport.size, columns))
     least, most = _per_view_pixel(camera, camera_from_view, viewport, place)
     seen = np.isfinite(least)
@@ -107,16 +110,9 @@ def _scaled(size: tuple[int, int], scale: float) -> tuple[int, int]:
     return int(size[0] * scale + SAME), int(size[1] * scale + SAME)
 
 
-def _rays(viewport: Viewport, place: Floats) -> Floats:
-    """Rays in the view frame through places (..., 2), in view pixels."""
-    middle = (np.array(viewport.size) - 1) / 2
-    xy = (place - middle) / viewport.focal_px
-    return np.concatenate([xy, np.ones((*xy.shape[:-1], 1))], axis=-1)
-
-
 def _project(camera: Camera, turn: Rotation, viewport: Viewport, place: Floats) -> Floats:
     """Pixels of the picture under places of the view, NaN where it sees nothing."""
-    ray = turn.apply(_rays(viewport, place).reshape(-1, 3)).reshape(*place.shape[:-1], 3)
+    ray = turn.apply(viewport.rays_at(place).reshape(-1, 3)).reshape(*place.shape[:-1], 3)
     return camera.project(ray)
 
 
@@ -153,7 +149,7 @@ def _spot(camera: Camera, turn: Rotation, viewport: Viewport, place: Floats) -> 
     seen = np.isfinite(least)
     if not seen.any():
         return Spot((np.nan, np.nan), (np.nan, np.nan))
-    there = resolution_at(camera, turn.apply(_rays(viewport, place[seen])))
+    there = resolution_at(camera, turn.apply(viewport.rays_at(place[seen])))
     return Spot(
         (float(there.least.min()), float(there.most.max())),
         (float(least[seen].min()), float(most[seen].max())),

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 import re
 
+from ..projections import PROJECTIONS
+
 
 def size(text: str) -> tuple[int, int]:
     """WIDTHxHEIGHT."""
@@ -23,3 +25,13 @@ def three_angles(text: str) -> tuple[float, float, float]:
             f"{text!r} is not three angles in degrees, such as 0,-90,0"
         ) from None
     return yaw, pitch, roll
+
+
+def add_projection_argument(parser: argparse._ActionsContainer) -> None:
+    listed = "; ".join(f"{kind.name}: {kind.about}" for kind in PROJECTIONS.values())
+    parser.add_argument(
+        "--projection",
+        choices=tuple(PROJECTIONS),
+        default="perspective",
+        help=f"of the view; {listed}",
+    )

@@ -3,6 +3,7 @@
   freelook render flight.mp4 left.mp4 --lens cam.json --yaw -35 --pitch 20 --hfov 80
   freelook render flight.mp4 view.mp4 --lens cam.json --poses head.csv --size 1920x1080
   freelook render shot.png view.png --lens cam.json --yaw 30
+  freelook render shot.png wide.png --lens cam.json --projection pannini --hfov 170
   freelook render flight.mp4 level.mp4 --lens cam.json --stabilize horizon --attitude flight.ulg
   freelook render GX010001.MP4 calm.mp4 --lens cam.json --stabilize smooth --attitude GX010001.MP4
 
@@ -28,7 +29,7 @@ from ..rotations import body_from_view
 from ..session import Session
 from ..types import ColorSpace, Frame
 from ..viewport import Viewport
-from ._arguments import size
+from ._arguments import add_projection_argument, size
 from ._cameras import add_lens_arguments, mounted_camera
 from ._circles import camera_by_circle
 from ._recording_aim import RecordingAim, add_stabilize_arguments, recording_aim
@@ -51,8 +52,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "with times from the first frame",
     )
     parser.add_argument(
-        "--hfov", type=float, default=90.0, metavar="DEG", help="horizontal field of view, 10-150"
+        "--hfov",
+        type=float,
+        default=90.0,
+        metavar="DEG",
+        help="horizontal field of view: 10-150, others than perspective views up to 360",
     )
+    add_projection_argument(parser)
     parser.add_argument(
         "--size", type=size, default=(1280, 720), metavar="WxH", help="of the view (1280x720)"
     )
@@ -65,7 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     from ..media.pictures import is_picture
 
-    viewport = Viewport(args.size, args.hfov)
+    viewport = Viewport(args.size, args.hfov, args.projection)
     look = _look(args)
     if os.path.realpath(args.input) == os.path.realpath(args.output):
         raise FreelookError("IN and OUT are the same file; name another OUT")

@@ -3,8 +3,9 @@ wide that the lens has nothing more to show.
 
 At the middle of a perspective view of `width` pixels there are
 (width / 2) / tan(hfov / 2) pi / 180 view pixels to a degree, and as many with another projection
-(`freelook.projections`) in place of the tangent; the camera has its own (`freelook.resolution`). A view may enlarge the camera's pixels
-`MOST_ENLARGED` times; narrower fields would show the same blur, larger.
+(`freelook.projections`) in place of the tangent; the camera has its own (`freelook.resolution`). A
+view may enlarge the camera's pixels `MOST_ENLARGED` times; narrower fields would show the same
+blur, larger.
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ class Window:
 
     def at(self, pixel: Floats) -> Floats:
         """Pixels of the view (..., 2) to those of the picture."""
-        return np.asarray(self.middle + (pixel - self.centre) @ self.slopes.T)
+        return np.asarray(self.middle + (np.asarray(pixel) - self.centre) @ self.slopes.T)
 
 
 def window_of(camera: Camera, camera_from_view: Rotation, viewport: Viewport) -> Window:
@@ -45,7 +45,7 @@ def window_of(camera: Camera, camera_from_view: Rotation, viewport: Viewport) ->
 def window_coordinates(camera: Camera, camera_from_view: Rotation, viewport: Viewport) -> Floats:
     """Where each pixel of a crop looks: (height, width, 2); NaN where the lens does not see."""
     width, height = viewport.size
-    pixel = np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1)
+    pixel = np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).astype(float)
     there = window_of(camera, camera_from_view, viewport).at(pixel)
     there[np.isnan(camera.ray(there)[..., 0])] = np.nan
     return there

@@ -5,13 +5,15 @@ The test is exact for any lens: the view's border is projected, and must be on t
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter1d, uniform_filter1d
 from scipy.spatial.transform import Rotation
 
 from ..camera import Camera
-from ..viewport import NARROWEST_DEG, WIDEST_DEG, Viewport
+from ..viewport import Viewport
 
 Floats = NDArray[np.float64]
 _PER_SIDE = 12
@@ -56,9 +58,11 @@ def widest_hfov_deg(camera: Camera, viewport: Viewport, body_from_view: Rotation
     views = Rotation.concatenate([body_from_view])
 
     def whole(hfov_deg: float) -> bool:
-        return bool(Containment(camera, Viewport(viewport.size, hfov_deg)).holds(views)[0])
+        return bool(Containment(camera, replace(viewport, hfov_deg=hfov_deg)).holds(views)[0])
 
-    low, high = NARROWEST_DEG, WIDEST_DEG
+    kind = viewport.kind
+    # a wider view of this size may be too high for its projection
+    low, high = kind.narrowest_deg, viewport.hfov_deg if kind.tallest_deg else kind.widest_deg
     if not whole(low):
         return None
     while high - low > 0.5:
@@ -80,9 +84,4 @@ def eased(allowed: Floats, half_window: int) -> Floats:
 
 def _border(viewport: Viewport) -> Floats:
     """Directions (m, 3) in the view frame round the outer edge of a view."""
-    width, height = viewport.size
-    x, y = width / 2 / viewport.focal_px, height / 2 / viewport.focal_px
-    along = np.linspace(-1, 1, _PER_SIDE)
-    ends = np.full(_PER_SIDE, 1.0)
-    sides = [(along, -ends), (along, ends), (-ends, along), (ends, along)]
-    return np.concatenate([np.stack([x * a, y * b, ends], axis=-1) for a, b in sides])
+    return viewport.border(_PER_SIDE)
