@@ -108,6 +108,15 @@ def test_a_stopped_view_stays_inside_and_on_its_side(
     assert before[:2] @ after[:2] >= -1e-12
 
 
+def test_views_of_other_projections_stay_inside_too() -> None:
+    viewport = Viewport((800, 600), 120, "stereographic")
+    stopped = soft_stop(looking(80, 30, 10), viewport, math.radians(95))
+    rays = stopped.apply(viewport.border(101))
+    angle = np.degrees(np.arctan2(np.hypot(rays[:, 0], rays[:, 1]), rays[:, 2]))
+    # 33 rays on a side miss the farthest point of a bent border by this at most
+    assert 90 < angle.max() <= 95 + 0.01
+
+
 def camera_of(field_deg: float = 180.0) -> Camera:
     return make_camera((1000, 1000), Equidistant(f=300.0), field_deg=field_deg)
 
