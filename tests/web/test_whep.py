@@ -357,6 +357,7 @@ def test_the_viewer_hears_why_there_is_no_video() -> None:
     async def test(station: Bench) -> None:
         viewer = await station.viewer()
         Camera(station.source).send()
+        await until(lambda: viewer.last("status"), "the first status")
         await until(lambda: viewer.last("status")["source"]["state"] == "live", "live")
         await until(lambda: viewer.last("status")["source"]["state"] == "lost", "lost")
         source = viewer.last("status")["source"]
