@@ -36,7 +36,8 @@ LAYER_OF = {name: number for number, names in enumerate(LAYERS) for name in name
 PLUG_INS = LAYERS[3]
 OUTSIDE = {"__init__", "__main__", "lenses"}
 
-HEAVY = ["cv2", "av", "numba", "aiohttp", "aiortc", "scipy"]
+HEAVY = ["cv2", "av", "numba", "aiohttp", "aiortc", "scipy", "scipy.signal", "scipy.stats"]
+HEAVY += ["matplotlib", "moderngl"]
 
 
 def modules() -> list[tuple[str, Path]]:
@@ -140,6 +141,11 @@ def test_the_base_needs_only_numpy_and_scipy() -> None:
         "from freelook.trackers import known_trackers; known_trackers(); import freelook.head"
     )
     assert loaded_after(trackers) <= {"scipy"}
+
+
+def test_no_command_waits_for_what_it_does_not_use() -> None:
+    parser = "from freelook.cli import make_parser; make_parser()"
+    assert loaded_after(parser) <= {"scipy", "cv2", "av"}
 
 
 def test_every_error_raised_on_purpose_has_one_root() -> None:

@@ -17,7 +17,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
-from scipy.signal import correlate
 from scipy.spatial.transform import Rotation
 
 from ..attitude_track import AttitudeTrack
@@ -177,6 +176,8 @@ class _Products:
 
 def _correlations(video: _Video, track: AttitudeTrack) -> _Products:
     """At lags a grid step apart."""
+    from scipy.signal import correlate  # slow to import, and every command would wait for it
+
     grid_ns = round(GRID_S * NS_PER_S)
     count = int((video.ends_ns[-1] - video.starts_ns[0]) // grid_ns) + 1
     video_times = video.starts_ns[0] + grid_ns * np.arange(count)
