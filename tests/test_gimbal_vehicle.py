@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from freelook.camera import Camera, make_camera
-from freelook.cli import main
+from freelook.cli import main, make_parser
+from freelook.cli._stabilising import gimbal_settings, vehicle_for
 from freelook.clock import NS_PER_MS, NS_PER_S
-from freelook.gimbal import Gimbal, LensLimit, Stabiliser
+from freelook.gimbal import Gimbal, LensLimit, Stabiliser, parse_shape
 from freelook.head import Head
 from freelook.lens import Equidistant
 from freelook.mailbox import Mailbox
@@ -28,7 +30,7 @@ from freelook.rotations import (
     head_angles_deg,
 )
 from freelook.session import Session
-from freelook.types import Attitude, Counters, Frame, Picture, Pose
+from freelook.types import AccessUnit, Attitude, Counters, Frame, Picture, Pose, StreamInfo
 from freelook.vehicle import Vehicle
 from freelook.viewport import Viewport
 
@@ -290,6 +292,63 @@ def test_render_says_what_is_wrong_with_a_mode(
     given = [str(log) if option == "LOG" else option for option in options]
     assert main(["render", "in.png", "out.png", "--lens", "demo", *given]) == 2
     assert why in capsys.readouterr().err
+
+
+class _Ingest:
+    """Notes who listens, and hands out mailboxes."""
+
+    def __init__(self) -> None:
+        self.listeners: list[Callable[[AccessUnit], None]] = []
+
+    def subscribe(self, listener: Callable[[AccessUnit], None]) -> None:
+        self.listeners.append(listener)
+
+    def frames(self) -> Mailbox[Frame]:
+        return Mailbox()
+
+
+def flying(*options: str) -> argparse.Namespace:
+    return make_parser().parse_args(["fly", "rtp://127.0.0.1:5004", "--lens", "demo", *options])
+
+
+def test_a_logs_times_follow_the_recording_that_is_flown_also_round_and_round(
+    tmp_path: Path,
+) -> None:
+    log = tmp_path / "log.csv"
+    rows = [f"{t / 10},{t}.0,0,0" for t in range(31)]
+    log.write_text("t_s,roll_deg,pitch_deg,yaw_deg\n" + "\n".join(rows) + "\n")
+    ingest = _Ingest()
+    args = flying("--mode", "horizon", "--attitude", str(log), "--attitude-offset", "1")
+    vehicle = vehicle_for(args, cast(Any, ingest), camera())
+    (listener,) = ingest.listeners
+    for began_s in (100, 200):
+        for media_ms, key in ((0, True), (500, False), (1000, True)):
+            capture_ns = began_s * NS_PER_S + media_ms * NS_PER_MS
+            listener(AccessUnit(StreamInfo("h264"), b"", key, capture_ns, media_ms * NS_PER_MS))
+            vehicle.stabiliser.at(capture_ns + NS_PER_S, capture_ns)
+            settled = vehicle.stabiliser.at(capture_ns + 3 * NS_PER_S, capture_ns)
+            roll = head_angles_deg(settled.body_from_base * FRD_FROM_RDF)[2]
+            assert roll == pytest.approx(-(10 + media_ms / 100)), "a second into the log"
+
+
+def test_a_live_attitudes_time_is_found_unless_it_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    source = ScriptedAttitude([])
+    monkeypatch.setattr("freelook.attitudes.open_attitude", lambda _spec: source)
+    live = ("--mode", "world", "--attitude", "live")
+    found = vehicle_for(flying(*live), cast(Any, _Ingest()), camera())
+    assert "not found yet" in found.status().offset
+    told = vehicle_for(flying(*live, "--attitude-offset", "-0.1"), cast(Any, _Ingest()), camera())
+    assert told.status().offset == ""
+    assert told.stabiliser.offset_ns == -100 * NS_PER_MS
+    for vehicle in (found, told):
+        vehicle.close()
+
+
+def test_what_is_made_of_the_head_comes_from_the_command_line() -> None:
+    args = flying("--gain", "yaw=2", "--invert", "roll", "--ahead", "35", "--hold", "3")
+    settings = gimbal_settings(args)
+    assert settings.shape == parse_shape("yaw=2", "", "roll")
+    assert (settings.ahead_s, settings.hold_s) == (0.035, 3.0)
 
 
 def test_render_in_horizon_mode_is_the_view_rolled_back(tmp_path: Path) -> None:
