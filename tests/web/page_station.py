@@ -152,8 +152,10 @@ class PageView:
     def set_head(self, yaw_deg: float, pitch_deg: float, roll_deg: float = 0.0) -> None:
         self.js("angles => freelook.setHead(...angles)", [yaw_deg, pitch_deg, roll_deg])
 
-    def set_view(self, width: int, height: int, hfov_deg: float) -> None:
-        view = {"width": width, "height": height, "hfovDeg": hfov_deg}
+    def set_view(
+        self, width: int, height: int, hfov_deg: float, projection: str = "perspective"
+    ) -> None:
+        view = {"width": width, "height": height, "hfovDeg": hfov_deg, "projection": projection}
         self.js("view => freelook.setView(view)", view)
 
     def coordinates(self) -> NDArray[np.float32]:

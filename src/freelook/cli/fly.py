@@ -30,6 +30,7 @@ from ..head import Head
 from ..prediction import make_predictor
 from ..trackers import known_trackers, open_tracker
 from ..viewport import Viewport
+from ._arguments import add_projection_argument
 from ._cameras import add_lens_arguments, mounted_camera
 from ._circles import camera_by_circle
 from ._progress import say
@@ -88,6 +89,7 @@ def add_flying_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--hfov", type=float, default=90.0, metavar="DEG", help="horizontal field of view at start"
     )
+    add_projection_argument(parser)
     add_head_arguments(parser)
     add_mode_arguments(parser)
     add_serving_arguments(parser)
@@ -130,7 +132,8 @@ def run(args: argparse.Namespace) -> int:
     from ..ingest import Ingest
     from ..sources import open_source
 
-    Viewport((16, 9), args.hfov)  # says what is wrong with it before the camera is asked
+    # says what is wrong with them before the camera is asked
+    Viewport((640, 64), args.hfov, args.projection)
     first, others = parsed_shows(args.show)
     camera = mounted_camera(args, lambda fov_deg: camera_by_circle(args.source, fov_deg))
     ingest = Ingest(lambda: open_source(args.source, loop=args.loop))
@@ -139,7 +142,9 @@ def run(args: argparse.Namespace) -> int:
     elif first.kind == "page":
         from ..web.station import About
 
-        about = About(args.source, False, args.hold, args.ease, args.hfov, args.limit)
+        about = About(
+            args.source, False, args.hold, args.ease, args.hfov, args.limit, args.projection
+        )
         fly(args, ingest, camera, about, never, others=others)
     else:
         fly_outputs(args, ingest, camera, [first, *others])
@@ -164,7 +169,7 @@ def fly(
     from ..web.serving import serve
     from ..web.station import Station
 
-    Viewport((16, 9), about.hfov_deg)  # these two say what is wrong with them
+    Viewport((640, 64), about.hfov_deg, about.projection)  # these two say what is wrong
     gimbal_settings(args)
     vehicle = vehicle_for(args, ingest, camera)
     with contextlib.ExitStack() as opened, FlightLine(others) as line:

@@ -9,9 +9,10 @@ from typing import Any
 from scipy.spatial.transform import Rotation
 
 from ..camera import Camera
-from ..gimbal import BODY, Aim, Base, most_focal_px, zoom_limits
+from ..gimbal import BODY, Aim, Base, ZoomLimits, most_focal_px, zoom_limits
 from ..head import HeadStatus
 from ..ingest import IngestStatus
+from ..projections import PROJECTIONS
 from ..rotations import FRD_FROM_RDF, RDF_FROM_FRD, to_wxyz
 from ..session import camera_from_head
 from ..types import Counters
@@ -140,15 +141,19 @@ def _offsets(camera: Camera) -> dict[str, Any] | None:
     }
 
 
-def zoom(camera: Camera) -> dict[str, float]:
+def zoom(camera: Camera) -> dict[str, Any]:
     """The fields that make sense: between these degrees, and no narrower than that a view's focal
-    length, in its own pixels, is this."""
-    limits = zoom_limits(camera, width_px=2)
+    length, in its own pixels, is this. By projection too."""
+    projections = {name: _degrees(zoom_limits(camera, 2, name)) for name in PROJECTIONS}
     return {
-        "narrowest_deg": limits.narrowest_deg,
-        "widest_deg": limits.widest_deg,
+        **projections["perspective"],
         "focal_px": most_focal_px(camera),
+        "projections": projections,
     }
+
+
+def _degrees(limits: ZoomLimits) -> dict[str, float]:
+    return {"narrowest_deg": limits.narrowest_deg, "widest_deg": limits.widest_deg}
 
 
 def milliseconds(nanoseconds: int | None) -> float | None:

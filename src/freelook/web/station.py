@@ -40,6 +40,7 @@ class About:
     ease_s: float = 2.0
     hfov_deg: float = 90.0
     limit: str = "black"
+    projection: str = "perspective"
 
 
 class UnknownName(LookupError):  # noqa: N818 - an answer, not a failure
@@ -108,6 +109,7 @@ class Station:
             "ease_s": self._about.ease_s,
             "hfov_deg": self._about.hfov_deg,
             "limit": self._about.limit,
+            "projection": self._about.projection,
             "modes": list(MODES),
             "rate_deg_s": GimbalSettings().rate_deg_s,
             "zoom": messages.zoom(self._camera),

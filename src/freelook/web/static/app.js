@@ -38,7 +38,7 @@ export class App {
     this.station = station;
     this.notify = notify;
     this.wake = this.wake.bind(this);
-    this.settings = new Settings({ limit: station.limit });
+    this.settings = new Settings({ limit: station.limit, projection: station.projection ?? 'perspective' });
     this.zoom = new Zoom(station.hfov_deg, station.zoom);
     this.renderer = new Renderer(byId('view'), shaderBody, new Camera(station.camera));
     this.limit = new LensLimit(this.renderer.profile, station.rate_deg_s);

@@ -1,6 +1,7 @@
 // Buttons and keys to actions.
 
 import { SPLITS } from './layout.js';
+import { PROJECTIONS } from './projections.js';
 
 /** @typedef {import('./app.js').App} App */
 
@@ -24,6 +25,7 @@ export function actionsOf(app) {
     mode: () => app.nextMode(),
     narrower: () => zoom.by(1 / 1.15),
     wider: () => zoom.by(1.15),
+    projection: () => nextProjection(app),
     pip: () => settings.set('pip', !settings.get('pip')),
     split: () => settings.set('split', (settings.get('split') + 1) % SPLITS.length),
     full: toggleFullScreen,
@@ -35,11 +37,20 @@ export function actionsOf(app) {
   };
 }
 
+/** @param {App} app */
+function nextProjection(app) {
+  const names = Object.keys(PROJECTIONS);
+  const next = names[(names.indexOf(app.screen.projection) + 1) % names.length];
+  app.settings.set('projection', next);
+  /** @type {HTMLSelectElement} */ (byId('projection-select')).value = next;
+  app.notify(`Projection: ${next}`);
+}
+
 /** @param {Record<string, () => void>} actions @returns {Record<string, () => void>} by key code */
 export const keysOf = (actions) => ({
   KeyR: actions.recentre, KeyC: actions.recentre, KeyT: actions.enable, KeyF: actions.full,
   KeyP: actions.pip, KeyV: actions.split, KeyH: actions.help, KeyI: actions.instruments,
-  KeyG: actions['give-back'], KeyM: actions.mode, Space: actions.front, Escape: actions.close,
+  KeyG: actions['give-back'], KeyM: actions.mode, KeyO: actions.projection, Space: actions.front, Escape: actions.close,
 });
 
 /** Every element with data-action does that. @param {Record<string, () => void>} actions

@@ -2,7 +2,7 @@
 //
 //   ready                      true once the page has its shader and the station's camera
 //   setHead(yaw, pitch, roll)  degrees; takes the command. setHead() gives it back
-//   setView({width, height, hfovDeg})  the view that readView and readCoordinates draw;
+//   setView({width, height, hfovDeg, projection?})  the view that readView and readCoordinates draw;
 //                              without argument: the window's own
 //   readView()                 {width, height, rgba: base64, rows from the top}: the newest
 //                              picture with the newest pose, drawn into memory
@@ -99,8 +99,8 @@ function stats(app) {
 }
 
 /** @param {import('./viewport.js').Viewport} view */
-const wholePixels = ({ width, height, hfovDeg }) =>
-  ({ width: Math.round(width), height: Math.round(height), hfovDeg });
+const wholePixels = ({ width, height, ...rest }) =>
+  ({ width: Math.round(width), height: Math.round(height), ...rest });
 
 /** @param {Uint8Array} bytes */
 function base64(bytes) {

@@ -2,13 +2,15 @@
 // their derivation are those of freelook/gimbal/limits.py.
 
 import { angleBetween, inverse, multiply, rotate, slerp, turned } from './quaternion.js';
-import { focalPx } from './viewport.js';
+import { rayOf } from './projections.js';
+import { focalPx, projectionOf } from './viewport.js';
 
 /** @typedef {import('./quaternion.js').Quaternion} Quaternion */
 /** @typedef {import('./viewport.js').Viewport} Viewport */
 /** @typedef {[number, number]} Pair */
 
 const KNEE = Math.PI / 18;
+const PER_SIDE = 33; // places on a side of a view
 
 /** How far from the optical axis a view may look, radians.
  * @param {Pair} outward @param {Pair} sides half the view on the plane z = 1
@@ -16,6 +18,27 @@ const KNEE = Math.PI / 18;
 export function reach(outward, sides, thetaMax) {
   return Math.max(0, Math.min(...cornerLimits(outward, sides, thetaMax),
     ...edgeLimits(outward, sides, thetaMax)));
+}
+
+/** The same for a view of any projection, by points of its border where that is not straight.
+ * @param {Pair} outward @param {Viewport} view @param {number} thetaMax @returns {number} */
+export function reachOf(outward, view, thetaMax) {
+  const projection = projectionOf(view);
+  const f = focalPx(view);
+  const [right, bottom] = [view.width / 2 / f, view.height / 2 / f];
+  if (projection === 'crop') return thetaMax;
+  if (projection === 'perspective') return reach(outward, [right, bottom], thetaMax);
+  let least = Math.PI;
+  for (let i = 0; i < PER_SIDE; i += 1) {
+    const along = (2 * i) / (PER_SIDE - 1) - 1;
+    for (const [x, y] of [[along, -1], [along, 1], [-1, along], [1, along]]) {
+      const ray = rayOf(projection, x * right, y * bottom);
+      const [u, z] = [ray[0] * outward[0] + ray[1] * outward[1], ray[2]];
+      const cosine = Math.cos(thetaMax) * Math.hypot(...ray) / Math.max(Math.hypot(u, z), 1e-9);
+      least = Math.min(least, Math.acos(Math.max(-1, Math.min(1, cosine))) - Math.atan2(u, z));
+    }
+  }
+  return Math.max(0, least);
 }
 
 /** @param {Pair} outward @param {Pair} sides @param {number} thetaMax @returns {number[]} */
@@ -78,7 +101,6 @@ export class LensLimit {
   /** @param {Quaternion} wanted @param {Viewport} view @param {number} [knee]
    * @returns {Quaternion} */
   stopped(wanted, view, knee = KNEE) {
-    const f = focalPx(view);
     const m = this.camera.cameraFromHead;
     const [x, y, z] = rotate(inverse(wanted), [m[6], m[7], m[8]]); // the optical axis
     const away = Math.hypot(x, y);
@@ -86,7 +108,7 @@ export class LensLimit {
     const outward = away > 1e-12 ? [-x / away, -y / away] : [1, 0];
     const theta = Math.atan2(away, z);
     const thetaMax = 2 * Math.atan(Math.sqrt(this.camera.tMax));
-    const limit = reach(outward, [view.width / 2 / f, view.height / 2 / f], thetaMax);
+    const limit = reachOf(outward, view, thetaMax);
     const kept = softened(theta, limit, knee);
     if (kept === theta) return wanted;
     return multiply(wanted, turned([-outward[1], outward[0], 0], kept - theta));

@@ -1,5 +1,6 @@
 // The settings panel: direction and scale of every input.
 
+import { PROJECTIONS } from './projections.js';
 import { INPUTS } from './settings.js';
 
 /** @param {HTMLElement} form @param {import('./settings.js').Settings} settings
@@ -18,7 +19,10 @@ export function fillPanel(form, settings, modes, setMode) {
     settings.reset();
     fillPanel(form, settings, modes, setMode);
   });
-  const view = fieldset('View', [modeRow(modes, setMode), choice(settings, 'limit',
+  const projections = Object.keys(PROJECTIONS).map((name) => /** @type {[string, string]} */
+    ([name, name]));
+  const view = fieldset('View', [modeRow(modes, setMode),
+    choice(settings, 'projection', 'Projection', projections), choice(settings, 'limit',
     'Past the lens’s edge', [['black', 'black'], ['soft', 'stop softly before it']])]);
   form.replaceChildren(...rows, view, reset);
 }
@@ -81,7 +85,7 @@ function deadZoneRow(settings, input, axis) {
 /** @param {import('./settings.js').Settings} settings @param {string} key @param {string} title
  * @param {[string, string][]} options */
 function choice(settings, key, title, options) {
-  const select = element('select', {});
+  const select = element('select', { id: `${key}-select` });
   for (const [value, textContent] of options) select.append(element('option', { value, textContent }));
   select.value = settings.get(key);
   select.addEventListener('change', () => settings.set(key, select.value));

@@ -4,7 +4,8 @@ import { LENS_UNIT, OFFSETS_UNIT, Picture, TARGET_UNIT, makeTexture } from './pi
 import { Pen } from './pen.js';
 import { matrix, matrixProduct } from './quaternion.js';
 import { Shaders } from './shader.js';
-import { focalPx } from './viewport.js';
+import { PROJECTIONS } from './projections.js';
+import { focalPx, projectionOf } from './viewport.js';
 
 /** @typedef {import('./quaternion.js').Quaternion} Quaternion */
 /** @typedef {import('./viewport.js').Viewport} Viewport */
@@ -57,12 +58,14 @@ export class Renderer {
     gl.clear(gl.COLOR_BUFFER_BIT);
   }
 
-  /** @param {Rect} rect @param {Quaternion} headFromView @param {number} hfovDeg */
-  drawView(rect, headFromView, hfovDeg) {
+  /** @param {Rect} rect @param {Quaternion} headFromView @param {number} hfovDeg
+   * @param {string} [projection] */
+  drawView(rect, headFromView, hfovDeg, projection) {
     if (!this.picture.version) return;
-    const program = this.begin([]);
+    const view = { width: rect.width, height: rect.height, hfovDeg, projection };
+    const program = this.begin(definesOf(view));
     this.placeOnCanvas(program, rect);
-    this.setView(program, { width: rect.width, height: rect.height, hfovDeg }, headFromView);
+    this.setView(program, view, headFromView);
     this.gl.drawArrays(this.gl.TRIANGLES, 0, 3);
   }
 
@@ -116,7 +119,7 @@ export class Renderer {
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.target.frame);
     const { texture } = this.target;
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
-    const program = this.begin(defines);
+    const program = this.begin([...definesOf(view), ...defines]);
     gl.viewport(0, 0, view.width, view.height);
     gl.uniform4f(program.at('pixel_from_fragment'), 1, 1, -0.5, -0.5);
     this.setView(program, view, headFromView);
@@ -173,6 +176,12 @@ export class Renderer {
     gl.uniform1i(program.at('lens_offsets'), OFFSETS_UNIT);
     gl.uniform1f(program.at('lens_p_max'), camera.offsets.pMax);
   }
+}
+
+/** @param {Viewport} view */
+function definesOf(view) {
+  const { define } = PROJECTIONS[projectionOf(view)];
+  return define ? [define] : [];
 }
 
 /** @param {[number, number]} size */

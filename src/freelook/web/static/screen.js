@@ -3,8 +3,9 @@
 import * as instruments from './instruments.js';
 import { panes, scaled, tapePlace } from './layout.js';
 import { drawCaption, drawHorizon, drawOutline, drawTape } from './overlay.js';
+import { PROJECTIONS } from './projections.js';
 import { IDENTITY } from './quaternion.js';
-import { spanning } from './viewport.js';
+import { filled, spanning } from './viewport.js';
 
 /** @typedef {import('./quaternion.js').Quaternion} Quaternion */
 /** @typedef {import('./viewport.js').Viewport} Viewport */
@@ -44,12 +45,20 @@ export class Screen {
     const { clientWidth, clientHeight } = this.stage;
     const { pip, split } = this.settings.values;
     this.pip.hidden = !pip || split === 1;
-    return panes(clientWidth, clientHeight, split, pip ? rectOf(this.pip) : null);
+    const made = panes(clientWidth, clientHeight, split, pip ? rectOf(this.pip) : null);
+    const fill = (/** @type {Rect} */ pane) => filled(pane, this.zoom.fieldDeg, this.projection);
+    return { ...made, main: fill(made.main), forward: made.forward && fill(made.forward) };
+  }
+
+  /** Of all views, by name. @returns {string} */
+  get projection() {
+    const wanted = this.settings.get('projection');
+    return wanted in PROJECTIONS ? wanted : 'perspective';
   }
 
   /** @param {{width: number, height: number}} pane @returns {Viewport} */
   viewOn({ width, height }) {
-    return spanning(width, height, this.zoom.fieldDeg);
+    return spanning(width, height, this.zoom.fieldDeg, this.projection);
   }
 
   /** Draws unless the same is there already; returns whether it did.
@@ -59,8 +68,9 @@ export class Screen {
     if (head !== this.drawnHead) this.movedMs = nowMs;
     this.drawnHead = head;
     this.fitCanvas();
+    this.zoom.use(this.projection);
     const { renderer, zoom, settings: { values }, stage } = this;
-    const key = [q, zoom.fieldDeg, renderer.picture.version, renderer.grey, values.pip,
+    const key = [q, zoom.fieldDeg, this.projection, renderer.picture.version, renderer.grey, values.pip,
       values.split, values.instruments, stage.clientWidth, stage.clientHeight].join();
     if (key === this.drawnKey) return false;
     this.drawnKey = key;
@@ -70,12 +80,15 @@ export class Screen {
 
   /** @param {Quaternion} q */
   drawPanes(q) {
-    const { renderer, ratio } = this;
+    const { renderer, ratio, projection } = this;
     const { main, forward, fisheye } = this.panes();
     const view = this.viewOn(main);
     renderer.clear();
-    renderer.drawView(scaled(main, ratio), q, view.hfovDeg);
-    if (forward) renderer.drawView(scaled(forward, ratio), IDENTITY, this.viewOn(forward).hfovDeg);
+    renderer.drawView(scaled(main, ratio), q, view.hfovDeg, projection);
+    if (forward) {
+      const { hfovDeg } = this.viewOn(forward);
+      renderer.drawView(scaled(forward, ratio), IDENTITY, hfovDeg, projection);
+    }
     renderer.pen.begin(ratio);
     if (this.settings.get('instruments')) this.drawLines(main, view, q);
     if (forward) drawCaption(renderer.pen, forward, 'STRAIGHT AHEAD');
@@ -87,7 +100,7 @@ export class Screen {
   /** @param {Rect} main @param {Viewport} view @param {Quaternion} q */
   drawLines(main, view, q) {
     const { pen } = this.renderer;
-    drawHorizon(pen, main, view, q);
+    if (view.projection !== 'crop') drawHorizon(pen, main, view, q); // only the lens knows where
     drawTape(pen, tapePlace(main, [byId('top'), byId('readings')].map(rectOf)), q);
   }
 

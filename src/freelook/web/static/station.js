@@ -5,6 +5,7 @@
  * @property {string} version @property {string} source @property {boolean} demo
  * @property {import('./camera.js').CameraJson} camera @property {string[]} trackers
  * @property {number} hold_s @property {number} ease_s @property {number} hfov_deg
+ * @property {string} [projection] of the views at the start
  * @property {string} limit soft or black: past the lens's edge @property {string[]} modes
  * @property {number} rate_deg_s of changes that are eased
  * @property {import('./zoom.js').ZoomLimits} zoom
