@@ -90,6 +90,18 @@ def test_the_past_is_that_of_the_poses() -> None:
         assert angle_between_deg(then, swing(newest.t_ns / NS_PER_S - age_s)) < 0.02
 
 
+def test_a_fast_tracker_costs_no_more() -> None:
+    """Two seconds at 2000 Hz: half a second is kept, at 2.5 ms, and the newest."""
+    history = PoseHistory()
+    for k in range(4000):
+        pose = Pose(body_from_view(0.02 * k, 0.0), k * NS_PER_MS // 2)
+        history.push(pose)
+    assert len(history) == pytest.approx(200, abs=3)
+    assert history.newest is pose
+    past = history.past_deg(np.array([0.0, 0.1]))
+    np.testing.assert_allclose(past, [[0.0, 0.0, 0.0], [0.0, -4.0, 0.0]], atol=1e-6)
+
+
 def test_before_its_oldest_pose_a_head_turned_as_since() -> None:
     history = PoseHistory()
     for k in range(3):

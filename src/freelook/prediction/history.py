@@ -22,6 +22,7 @@ from ..types import Counters, Pose
 FASTEST_DEG_S = 1200.0
 RATE_CHANGE_DEG_S = 250.0
 SMALLEST_JUMP_DEG = 3.0
+CLOSEST_NS = 2_500_000  # between poses that are kept: more often tells nothing more
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,8 @@ class HistorySettings:
 
 
 class PoseHistory:
-    """Poses in order of time, from after the last jump or gap.
+    """Poses in order of time, from after the last jump or gap: all of a tracker up to 400 Hz, of a
+    faster one so many, and always the newest.
 
     `counters`: `not finite`, `not newer` (ignored), `jumps`, `gaps` (history begun anew).
     """
@@ -77,6 +79,7 @@ class PoseHistory:
                 self.counters.add("not newer")
                 return False
             self._break_off(before, pose)
+            self._thin()
         self._poses.append(pose)
         self._quats.append(-quat if self._quats and quat @ self._quats[-1] < 0 else quat)
         self._forget(pose.t_ns)
@@ -130,6 +133,12 @@ class PoseHistory:
             return True
         known = self._rate_deg_s
         return known is not None and bool(np.linalg.norm(rate_deg_s - known) > RATE_CHANGE_DEG_S)
+
+    def _thin(self) -> None:
+        """Let the newest go, before the next comes, where it was close to the one before it."""
+        if len(self._poses) > 1 and self._poses[-1].t_ns - self._poses[-2].t_ns < CLOSEST_NS:
+            self._poses.pop()
+            self._quats.pop()
 
     def _forget(self, now_ns: int) -> None:
         oldest_ns = now_ns - round(self.settings.span_s * NS_PER_S)
