@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -18,6 +18,7 @@ from ._signals import asked_to_stop
 from ._stabilising import vehicle_for
 
 if TYPE_CHECKING:
+    from ..head import Head
     from ..ingest import Ingest
     from ..outputs.spec import OutputSpec
     from ..vehicle import Vehicle
@@ -106,7 +107,7 @@ def fly_in_window(
         vehicle.start()
         for head in heads.values():
             head.start()
-        report = _report(ingest, vehicle, line, outputs)
+        report = _report(ingest, vehicle, heads, line, outputs)
         outside = Outside(now_ns, opened.enter_context(asked_to_stop()), report)
         pilot = Pilot(heads, window.hfov_deg or args.hfov, vehicle.stabiliser)
         limit = LensLimit(camera) if args.limit == "soft" else None
@@ -116,14 +117,21 @@ def fly_in_window(
 
 
 def _report(
-    ingest: Ingest, vehicle: Vehicle, line: FlightLine, outputs: Callable[[], str]
+    ingest: Ingest,
+    vehicle: Vehicle,
+    heads: Mapping[str, Head],
+    line: FlightLine,
+    outputs: Callable[[], str],
 ) -> Callable[[int], float]:
-    """Says how the source and the mode are; the picture greys while the source is lost."""
+    """Says how the source, the mode and the trackers are; the picture greys while the source is
+    lost."""
 
     def grey(at_ns: int) -> float:
         status = ingest.status(at_ns)
         mode = vehicle.status()
         parts = [f"source: {status.state}", status.message, f"mode: {mode.mode}", mode.message]
+        told = [head.status(at_ns) for head in heads.values()]
+        parts += [f"{one.name} {one.state}: {one.message}" for one in told if one.message]
         parts.append(outputs())
         line.show("; ".join(filter(None, parts)))
         return 1.0 if status.state == "lost" else 0.0
