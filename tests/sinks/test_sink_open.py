@@ -18,6 +18,8 @@ EXAMPLES = {
     "picture": "out.png",
     "rtp": "rtp://127.0.0.1:9",
     "udp": "udp://127.0.0.1:9",
+    "rtsp": "rtsp://127.0.0.1:8554/view",
+    "rtsp-server": "rtsp-server://127.0.0.1:8554",
     "terminal": "terminal",
     "snapshot": "shots/",
     "virtual-camera": "virtual-camera",
@@ -48,8 +50,11 @@ def test_unknown_arguments_list_what_is_known(argument: str) -> None:
         open_sink(argument, size=SIZE)
 
 
-# a virtual camera needs one in the system: test_sink_virtualcamera.py
-@pytest.mark.parametrize("kind", sorted(set(EXAMPLES) - {"virtual-camera"}))
+# these need something of the system, and have their own tests
+NEEDY = {"virtual-camera", "rtsp", "rtsp-server"}
+
+
+@pytest.mark.parametrize("kind", sorted(set(EXAMPLES) - NEEDY))
 def test_every_sink_takes_frames_and_closes(
     kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

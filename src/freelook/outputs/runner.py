@@ -30,9 +30,9 @@ Describe = Callable[[View], dict[str, str]]
 class OutputStatus:
     """`state`: waiting (for the first picture), live, retrying, or failed (for good).
 
-    `rate_hz` counts the last second's views. Counters: shown, dropped (frames that were never
-    shown because the output was busy), missed (views between a failure and the next attempt), late
-    (views skipped at a fixed rate), failures.
+    `rate_hz` counts the last second's views. Counters: shown, dropped (frames never shown because
+    the output was busy; not counted at a fixed rate), late (views left out at a fixed rate), missed
+    (views between a failure and the next attempt), failures; and the sink's own.
     """
 
     name: str
@@ -105,7 +105,8 @@ class Output:
 
     def status(self, now_ns: int) -> OutputStatus:
         counters = dict(self._counters.values)
-        counters["dropped"] = counters.get("dropped", 0) + self._frames.dropped
+        if self._period_ns is None:  # else frames between the views are meant to be left out
+            counters["dropped"] = self._frames.dropped
         own = getattr(self._sink, "counters", None)
         if own is not None:
             counters |= dict(own.values)

@@ -6,23 +6,28 @@ import socket
 from collections.abc import Iterator
 from urllib.parse import urlsplit
 
+from ..clock import NS_PER_S
 from ..errors import RenderError, SinkError
 from ..media.encoder import Encoder
 from ..types import AccessUnit, Counters, Frame
 from . import SinkSettings
 
+KEY_INTERVAL_NS = NS_PER_S
 ANSWER_BYTES = 2000
 MOST_ANSWERS = 16  # read for one picture; what floods us must not hold up the pictures
 
 
 class LiveEncoder:
-    """Frames in, access units out. Counters: sent (pictures), keys_asked. SinkError where this
-    machine or these settings cannot."""
+    """Frames in, access units out; a key picture every second of capture time, and when asked.
+
+    Counters: sent (pictures), keys_asked. SinkError where this machine or these settings cannot.
+    """
 
     def __init__(self, argument: str, settings: SinkSettings) -> None:
         self.counters = Counters()
         self._argument = argument
-        self._key = False
+        self._key = True
+        self._key_ns = 0
         try:
             self._encoder = Encoder(
                 settings.size,
@@ -40,12 +45,14 @@ class LiveEncoder:
         return self._encoder.codec
 
     def want_key(self) -> None:
-        """The next picture is a key picture."""
+        """The next picture is a key picture. From any thread."""
         self.counters.add("keys_asked")
         self._key = True
 
     def encode(self, frame: Frame) -> list[AccessUnit]:
-        key, self._key = self._key, False
+        key = self._key or frame.capture_ns - self._key_ns >= KEY_INTERVAL_NS
+        if key:
+            self._key, self._key_ns = False, frame.capture_ns
         try:
             units = self._encoder.encode(frame, key=key)
         except RenderError as error:

@@ -22,8 +22,6 @@ DATAGRAM_BYTES = 7 * 188  # whole packets, as many as fit in an Ethernet frame
 # tables with every picture: a receiver can begin at any; nothing is held back for order
 OPTIONS = {
     "flush_packets": "1",
-    "muxdelay": "0",
-    "muxpreload": "0",
     "pat_period": "0.1",
     "pcr_period": "20",
 }

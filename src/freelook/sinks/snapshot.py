@@ -1,4 +1,4 @@
-"""Single views as PNG files that say where they look: `snapshot:view.png`, or in a folder: `shots/`."""
+"""Single views as PNG that say where they look: `snapshot:view.png`, or a folder: `shots/`."""
 
 from __future__ import annotations
 
