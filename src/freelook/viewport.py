@@ -36,7 +36,7 @@ class Viewport:
             raise RenderError(f"a view of {self.size[0]} x {self.size[1]} pixels is too small")
         kind = projection_named(self.projection)
         if not kind.narrowest_deg <= self.hfov_deg <= kind.widest_deg:
-            of = "" if kind.name == "perspective" else f" of a {kind.name} view"
+            of = "" if kind.name == "perspective" else f" of {kind.name} views"
             raise RenderError(
                 f"horizontal field of view{of} must be {kind.narrowest_deg:.0f} to "
                 f"{kind.widest_deg:.0f} degrees, not {self.hfov_deg}"
@@ -49,7 +49,7 @@ class Viewport:
         if self.size[1] > most:
             raise RenderError(
                 f"a view of {self.size[0]} x {self.size[1]} pixels with {self.hfov_deg:g} degrees "
-                f"across is higher than the {tallest_deg:g} degrees of a {kind.name} one: "
+                f"across is higher than the {tallest_deg:g} degrees of {kind.name} views: "
                 f"make it at most {most} pixels high"
             )
 
