@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from freelook.camera import Camera, make_camera
 from freelook.cli import main, make_parser
-from freelook.cli._stabilising import gimbal_settings, vehicle_for
+from freelook.cli._stabilising import gimbal_settings, stabiliser_for, vehicle_for
 from freelook.clock import NS_PER_MS, NS_PER_S
 from freelook.gimbal import Gimbal, LensLimit, Stabiliser, parse_shape
 from freelook.head import Head
@@ -346,6 +346,7 @@ def test_a_live_attitudes_time_is_found_unless_it_is_told(monkeypatch: pytest.Mo
 
 def test_what_is_made_of_the_head_comes_from_the_command_line() -> None:
     args = flying("--gain", "yaw=2", "--invert", "roll", "--ahead", "35", "--hold", "3")
+    assert stabiliser_for(flying("--follow", "2.5")).settings.follow_s == 2.5
     settings = gimbal_settings(args)
     assert settings.shape == parse_shape("yaw=2", "", "roll")
     assert (settings.ahead_s, settings.hold_s) == (0.035, 3.0)

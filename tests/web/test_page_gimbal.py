@@ -106,6 +106,13 @@ def test_eyes_front_overrules_a_tracker_and_needs_no_station(tracked: PageView) 
     assert tracked.js("freelook.headSource") == "opentrack"
 
 
+def test_space_releases_eyes_front_of_the_station_too(tracked: PageView, page_station: Any) -> None:
+    tell(tracked, messages.pose("opentrack", Aim(body_from_view(0, 0), "front", None), 0))
+    tracked.page.keyboard.press("Space")
+    tracked.until("document.getElementById('notice').textContent === 'opentrack switched on'")
+    assert page_station.controls == [{"tracker": "opentrack", "action": "enable"}]
+
+
 EASE = """([before, after]) => {
     const {command} = freelook.app;
     const ease = new command.ease.constructor(240);

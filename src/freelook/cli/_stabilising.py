@@ -11,7 +11,15 @@ from ..attitude_track import AttitudeTrack
 from ..camera import Camera
 from ..clock import NS_PER_S
 from ..errors import AttitudeError
-from ..gimbal import LIMITS, MODES, GimbalSettings, Stabiliser, parse_shape, parse_target
+from ..gimbal import (
+    LIMITS,
+    MODES,
+    GimbalSettings,
+    Stabiliser,
+    StabiliserSettings,
+    parse_shape,
+    parse_target,
+)
 from ..prediction import DEFAULT, PREDICTORS
 from ..types import AccessUnit, Attitude
 from ..vehicle import Vehicle
@@ -51,6 +59,13 @@ def add_mode_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="AZ,EL",
         help="what the mode point looks at: degrees from north and above the horizon, "
         "or LAT,LON,ALT",
+    )
+    parser.add_argument(
+        "--follow",
+        type=float,
+        default=StabiliserSettings().follow_s,
+        metavar="S",
+        help="time constant of the mode follow: of a turn, 37 %% are missing after it (default 1)",
     )
     parser.add_argument(
         "--limit",
@@ -112,7 +127,7 @@ def check_mode(args: argparse.Namespace) -> None:
 def stabiliser_for(args: argparse.Namespace, buffer: AttitudeBuffer | None = None) -> Stabiliser:
     """In the mode that was asked for, knowing no attitude yet."""
     check_mode(args)
-    stabiliser = Stabiliser(buffer=buffer)
+    stabiliser = Stabiliser(StabiliserSettings(follow_s=args.follow), buffer)
     stabiliser.set_offset(round((args.attitude_offset or 0.0) * NS_PER_S))
     target = None if args.point is None else parse_target(args.point)
     stabiliser.set_mode(args.mode, target)

@@ -88,6 +88,7 @@ export class Command {
   /** Look forward at once; again: go on. */
   toggleFront() {
     if (this.front) return this.release();
+    if (this.headAim(performance.now()).state === 'front') return this.ask('enable'); // the station's
     this.front = true;
     this.ease.stop();
     storeLatches({ front: true, hand: this.hand.enabled, phone: this.phone.enabled });
