@@ -24,6 +24,13 @@ settings.register_profile(
 settings.load_profile("freelook")
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Files that use a browser come last: Playwright keeps an event loop running on the main
+    thread, where after it no test could run its own."""
+    browsing = {item.path for item in items if "browser" in getattr(item, "fixturenames", ())}
+    items.sort(key=lambda item: item.path in browsing)
+
+
 @pytest.fixture(autouse=True)
 def _loud_arithmetic() -> Iterator[None]:
     """Overflow, invalid operations and the like are errors in every test."""
