@@ -164,8 +164,8 @@ def test_what_is_refused(
     assert f"{taken} exists; --overwrite" in refused(capsys, *shots, "-o", str(taken))
     assert taken.read_text() == "mine"
     assert "give pictures, videos or corner files" in refused(capsys)
-    said = refused(capsys, *shots, "--model", "splined_stereographic")
-    assert "cannot be calibrated here" in said
+    said = refused(capsys, *shots, "--control", "16x12")
+    assert "--control goes with --model splined_stereographic" in said
 
 
 @pytest.mark.data

@@ -18,7 +18,6 @@ from scipy.spatial.transform import Rotation
 
 from ..calibration.bundle import REJECT
 from ..calibration.calibrate import Calibration, calibrate
-from ..calibration.candidates import NOT_FROM_BOARDS
 from ..calibration.parameters import HELD
 from ..calibration.slopes import project
 from ..calibration.uncertainty import grid_of, projection_covariance
@@ -85,8 +84,7 @@ class Summary:
 
 def round_models() -> list[str]:
     """All that can be calibrated and are round."""
-    made = {name: kind for name, kind in MODELS.items() if name not in NOT_FROM_BOARDS}
-    return [name for name, kind in made.items() if not hasattr(kind, "offset")]
+    return [name for name, kind in MODELS.items() if not hasattr(kind, "offset")]
 
 
 def run(

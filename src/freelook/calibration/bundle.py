@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ..camera import Camera
 from ..errors import CalibrationError, ProfileError
 from ..lens import Floats
-from .equations import Equations, Problem, State
+from .equations import Equations, Problem, Pull, State
 from .parameters import Freedom, Parameters
 from .slopes import cross_matrices, point_slopes, project, value_slopes
 from .views import Pose, View
@@ -63,6 +63,7 @@ class Solution:
     noise_px    standard deviation of a coordinate, from the points that count
     together    how many times as far the views disagree on the camera as independent errors would
                 make them (1: not at all); the covariance takes it in
+    pull        what the free values were pulled to, if to anything; the covariance takes it in
     """
 
     camera: Camera
@@ -74,6 +75,7 @@ class Solution:
     condition: float
     noise_px: float
     together: float
+    pull: Pull | None = None
 
     @property
     def rms_px(self) -> float:
@@ -99,17 +101,19 @@ def solve(
     counted: Sequence[Bools] | None = None,
     steps: int = STEPS,
     enough: float = ENOUGH,
+    pull: Pull | None = None,
 ) -> Solution:
     """Adjust everything, starting from a camera and poses that are about right.
 
     robust   False counts every point fully, or those that are true in `counted`, (n,) a view
     steps    bounds each minimisation
     enough   relative gain of a step that is the last
+    pull     what the free values are pulled to
 
     A view with fewer than 4 points that count keeps its pose and counts for nothing.
     CalibrationError when the views do not determine the camera.
     """
-    problem = BoardProblem(views, camera, freedom or Freedom())
+    problem = BoardProblem(views, camera, freedom or Freedom(), pull)
     state = State.of(problem.parameters.values, poses)
     with np.errstate(all="ignore"):  # steps may lead anywhere; what is no number is not taken
         if robust:
@@ -158,7 +162,10 @@ KNOWN = Freedom(lens=False, center=False, aspect=False)
 class BoardProblem:
     """The views stacked, and what a row of values means."""
 
-    def __init__(self, views: Sequence[View], camera: Camera, freedom: Freedom) -> None:
+    def __init__(
+        self, views: Sequence[View], camera: Camera, freedom: Freedom, pull: Pull | None = None
+    ) -> None:
+        self.pull = pull
         self.parameters = Parameters(camera, freedom)
         self.points = np.concatenate([view.points for view in views])
         self.pixels = np.concatenate([view.pixels for view in views])
@@ -269,13 +276,13 @@ def _minimise(
     residuals = problem.residuals(state)
     for _ in range(steps):
         weights = weights_of(residuals)
-        cost = float(weights @ _squares(residuals))
+        cost = _cost(problem, state, residuals, weights)
         equations = Equations.of(problem, state, residuals, weights)
         if not equations.sound:
             return state
         while True:
             moved, new = _tried(problem, state, equations.step(damping))
-            if new is not None and (new_cost := float(weights @ _squares(new))) < cost:
+            if new is not None and (new_cost := _cost(problem, moved, new, weights)) < cost:
                 break
             damping *= 8
             if damping > 1e10:
@@ -284,6 +291,11 @@ def _minimise(
         if cost - new_cost < enough * cost:
             return state
     return state
+
+
+def _cost(problem: Problem, state: State, residuals: Floats, weights: Floats) -> float:
+    pulled = problem.pull.cost(state.values) if problem.pull else 0.0
+    return float(weights @ _squares(residuals)) + pulled
 
 
 def _tried(
@@ -322,8 +334,8 @@ def adjusted(problem: Problem, state: State) -> Adjusted:
 
 def _known(problem: Problem, state: State, counted: Floats) -> Adjusted:
     used = sum(bool(counted[part].any()) for part in problem.parts)
-    unknowns = len(state.values) + 6 * used
-    surplus = 2 * int(counted.sum()) - unknowns
+    unknowns = 6 * used + (0 if problem.pull else len(state.values))
+    surplus = float(2 * int(counted.sum()) - unknowns)
     if surplus < 1:
         raise CalibrationError(
             f"{int(counted.sum())} points are too few for {unknowns} unknowns; add views"
@@ -336,15 +348,18 @@ def _known(problem: Problem, state: State, counted: Floats) -> Adjusted:
         each, right = equations.eliminated()
     except np.linalg.LinAlgError:
         raise CalibrationError(UNDETERMINED) from None
-    scale = 1 / np.sqrt(np.maximum(np.diag(each.sum(0)), 1e-300))
-    each = each * np.outer(scale, scale)
-    if not np.isfinite(each).all():
+    whole = each.sum(0) + equations.pull
+    scale = 1 / np.sqrt(np.maximum(np.diag(whole), 1e-300))
+    each, whole = each * np.outer(scale, scale), whole * np.outer(scale, scale)
+    if not np.isfinite(whole).all():
         raise CalibrationError(UNDETERMINED)
-    condition = float(np.linalg.cond(each.sum(0))) if len(scale) else 1.0
+    condition = float(np.linalg.cond(whole)) if len(scale) else 1.0
     if not condition < WORST_CONDITION:
         raise CalibrationError(UNDETERMINED)
+    inverse = np.linalg.inv(whole)
+    if problem.pull:  # values that are only what was expected of them took up no noise
+        surplus -= float(np.sum(inverse * each.sum(0)))
     variance = float(counted @ _squares(residuals)) / surplus
-    inverse = np.linalg.inv(each.sum(0))
     together = _together(inverse, each, right * scale, variance)
     covariance = together**2 * variance * inverse * np.outer(scale, scale)
     noise = float(np.sqrt(variance))
@@ -382,6 +397,7 @@ def _solution(problem: BoardProblem, state: State, weights: Floats) -> Solution:
         known.condition,
         known.noise_px,
         known.together,
+        problem.pull,
     )
 
 

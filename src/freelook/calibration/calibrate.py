@@ -13,11 +13,20 @@ import numpy as np
 
 from ..camera import Camera
 from ..errors import CalibrationError, FreelookError
-from ..lens import Floats
+from ..lens import Floats, SplinedStereographic
 from .bundle import Solution, resect_all, solve
-from .candidates import AUTO, Candidate, Progress, check_model, chosen, tried
+from .candidates import (
+    AUTO,
+    Candidate,
+    Progress,
+    check_model,
+    chosen,
+    tried,
+    with_free_form,
+)
 from .doubts import check_enough, check_fit, doubts, typical_uncertainty
 from .field import seen_angle, with_field
+from .free_form import FREE_FORM, Control, check_control
 from .initial import as_kannala_brandt, first_guesses, mirrored, pose_of
 from .parameters import Freedom
 from .views import Pose, View, checked
@@ -62,6 +71,12 @@ class Calibration:
         return self.solution.rms_px
 
     @property
+    def control(self) -> Control | None:
+        """(across, down) control points of a free-form lens; None of any other."""
+        lens = self.camera.lens
+        return (lens.nx, lens.ny) if isinstance(lens, SplinedStereographic) else None
+
+    @property
     def rejected(self) -> int:
         """Points of the used views that do not count."""
         return int(sum((~ok).sum() for ok in self.solution.inliers))
@@ -74,6 +89,7 @@ def calibrate(
     freedom: Freedom | None = None,
     *,
     drop: bool = True,
+    control: Control | None = None,
     progress: Progress = lambda _: None,
 ) -> Calibration:
     """Calibrate a camera from views of a flat target, without any guess.
@@ -81,18 +97,24 @@ def calibrate(
     size   (width, height) of all pictures
     model  a name in `MODELS`, or auto: the simplest that predicts views left out best
     drop   False: every point of the views counts in the end, far off or not
+    control  (across, down) control points of a free-form lens; None: as many as points carry
 
     CalibrationError says what is wrong with the views and what to do about it.
     """
     check_model(model)
+    if control:
+        check_control(control)
     freedom = freedom or Freedom()
     used, dropped = checked(views, size)
     progress("first guess")
     used, base, strays = _without_strays(used, _base(used, size, freedom), freedom)
     check_enough(base, used, freedom)
-    models = AUTO if model == "auto" else (model,)
+    asked = model == FREE_FORM
+    models = AUTO if asked or model == "auto" else (model,)
     candidates = tried(models, used, base, freedom, progress, drop=drop)
-    best = chosen(candidates)
+    if asked or model == "auto":
+        candidates = with_free_form(candidates, used, freedom, progress, control, asked=asked)
+    best = chosen(candidates[-1:] if asked else candidates)
     solution = best.solution
     assert solution is not None
     seen = seen_angle(solution, used)

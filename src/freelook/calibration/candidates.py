@@ -8,6 +8,9 @@ the camera is solved without a fifth of the views at a time, those views only ge
 their residuals tell how the model does on pictures it has not seen. A model with more parameters
 fits better and predicts worse once it is too much.
 
+A free-form lens is tried last, from the one taken, when it is asked for or where one linear step
+towards it promises to predict views left out better (see `free_form.promised_gain`).
+
 Taken is the model with the fewest parameters that predicts within 1 % of the best. Not within one
 standard error, as is often done: a lens model is wrong mostly at the rim, where few views reach,
 and over so few views a difference that is all too real is within its standard error.
@@ -26,7 +29,15 @@ from ..errors import CalibrationError, FreelookError
 from ..fitting.refit import refit
 from ..lens import MODELS, Lens, RadialSpline, growth_limit
 from .bundle import Solution, solve
-from .field import MARGIN, angles, seen_angle
+from .field import MARGIN, angles, seen_angle, with_field
+from .free_form import (
+    FREE_FORM,
+    Control,
+    free_form,
+    free_form_predicts_px,
+    promised_gain,
+    usual_control,
+)
 from .left_out import cross_validate
 from .nearby import nearby
 from .parameters import HELD, Freedom, lens_names
@@ -47,6 +58,7 @@ AUTO = (
 )
 # A model with more parameters must predict at least this much better.
 WORTH_IT = 0.99
+WORTH_TRYING = 0.02  # of the squared distances, which is 1 % of their root
 OUT_OF_THE_RACE = 1.5  # times the best RMS: what fits so badly need not be tested further
 # Among others a model is given up, after some steps, at so many times the RMS of Kannala-Brandt.
 FAR_OFF, ROUGH_STEPS, ROUGH_ENOUGH = 3.0, 12, 1e-3
@@ -54,10 +66,6 @@ OVERFIT = 1.3  # times the RMS on views left out
 BEYOND = np.radians(0.5)  # of a model's end: more than the first lens may be off there
 FEW_FOLDED = 0.02  # of the points that count
 KNOT_EVERY_DEG = 12.0
-NOT_FROM_BOARDS = {
-    "splined_stereographic": "it has parameters where no corner was seen; radial_spline is as "
-    "flexible along the radius, and mrcal's own result can be read",
-}
 
 Progress = Callable[[str], None]
 Counted = tuple[NDArray[np.bool_], ...]
@@ -69,7 +77,8 @@ class Candidate:
 
     `rms_px` and `cross_validated_px` (RMS, 2-D, per point) of all candidates are over the same
     points. The latter is NaN with fewer than 3 views, where the rest did not determine the model,
-    and for models that fit 1.5 times as badly as the best.
+    and for models that fit 1.5 times as badly as the best. `instead_of` is the model that a
+    free-form one is pulled towards.
     """
 
     model: str
@@ -77,6 +86,7 @@ class Candidate:
     cross_validated_px: float = float("nan")
     solution: Solution | None = None
     why_not: str = ""
+    instead_of: str = ""
 
     @property
     def remark(self) -> str:
@@ -86,13 +96,9 @@ class Candidate:
 
 
 def check_model(model: str) -> None:
-    """CalibrationError for a model that is unknown, or cannot be calibrated."""
-    if model == "auto":
-        return
-    if model not in MODELS:
+    """CalibrationError for a model that is unknown."""
+    if model != "auto" and model not in MODELS:
         raise CalibrationError(f"unknown model '{model}'; known: auto, {', '.join(MODELS)}")
-    if model in NOT_FROM_BOARDS:
-        raise CalibrationError(f"{model} cannot be calibrated here: {NOT_FROM_BOARDS[model]}")
 
 
 def tried(
@@ -126,6 +132,45 @@ def tried(
         else c
         for c in same
     ]
+
+
+def with_free_form(
+    candidates: list[Candidate],
+    views: Sequence[View],
+    freedom: Freedom,
+    progress: Progress,
+    control: Control | None = None,
+    *,
+    asked: bool = True,
+) -> list[Candidate]:
+    """The candidates and a free-form lens from the best of them; not `asked`: only where that one
+    leaves something to follow.
+
+    control  (across, down) control points; None: as many as the points carry
+    """
+    best = chosen(candidates)
+    assert best.solution is not None
+    if not (asked or promised_gain(best.solution, views) > WORTH_TRYING):
+        return candidates
+    progress(FREE_FORM)
+    return [*candidates, _free_form(best, best.solution, views, freedom, control)]
+
+
+def _free_form(
+    best: Candidate,
+    start: Solution,
+    views: Sequence[View],
+    freedom: Freedom,
+    control: Control | None,
+) -> Candidate:
+    try:
+        control = control or usual_control(start, views)
+        solution = free_form(start, views, None, control)
+        with_field(solution.camera, seen_angle(solution, views))
+        predicted = free_form_predicts_px(start, views, freedom, control)
+    except FreelookError as error:
+        return Candidate(FREE_FORM, why_not=str(error), instead_of=best.model)
+    return Candidate(FREE_FORM, solution.rms_px, predicted, solution, instead_of=best.model)
 
 
 def chosen(candidates: Sequence[Candidate]) -> Candidate:

@@ -16,6 +16,28 @@ from scipy.spatial.transform import Rotation
 from ..lens import Floats
 from .views import Pose
 
+MANY = 64  # columns: from there on it is worth looking which are not 0
+
+
+@dataclass(frozen=True)
+class Pull:
+    """What is expected of the values (k,), and how sure that is: information (k, k), in the
+    pixels squared that a distance from it costs."""
+
+    expected: Floats
+    information: Floats
+
+    def cost(self, values: Floats) -> float:
+        off = values - self.expected
+        return float(off @ self.information @ off)
+
+    def right(self, values: Floats) -> Floats:
+        return np.asarray(self.information @ (self.expected - values))
+
+    @classmethod
+    def none(cls, count: int) -> Pull:
+        return cls(np.zeros(count), np.zeros((count, count)))
+
 
 @dataclass(frozen=True)
 class State:
@@ -43,13 +65,15 @@ class State:
 
 
 class Problem(Protocol):
-    """What is minimised: `count` points in `parts`, each of which has its own pose.
+    """What is minimised: `count` points in `parts`, each of which has its own pose, and what the
+    values are pulled to, if anything.
 
     How values and poses become pixels is the problem's own affair: one camera, or two on a rig.
     """
 
     count: int
     parts: list[slice]
+    pull: Pull | None = None
 
     def residuals(self, state: State) -> Floats:
         """(count, 2): seen minus projected, pixels."""
@@ -62,13 +86,15 @@ class Problem(Protocol):
 
 @dataclass(frozen=True)
 class Equations:
-    """The normal equations in blocks: camera, poses, and between them."""
+    """The normal equations in blocks: camera, poses, and between them; and the camera's pull."""
 
     camera: Floats  # (parts, k, k)
     between: Floats  # (parts, k, 6)
     poses: Floats  # (parts, 6, 6)
     camera_right: Floats  # (parts, k)
     poses_right: Floats  # (parts, 6)
+    pull: Floats  # (k, k)
+    pull_right: Floats  # (k,)
 
     @classmethod
     def of(cls, problem: Problem, state: State, residuals: Floats, weights: Floats) -> Equations:
@@ -79,6 +105,7 @@ class Equations:
         rows = np.concatenate([by_camera, by_pose, residuals[:, :, None]], axis=-1)
         rows = (rows * root[:, None, None]).reshape(2 * problem.count, k + 7)
         products = np.stack([_square(rows[2 * p.start : 2 * p.stop]) for p in problem.parts])
+        pull = problem.pull or Pull.none(k)
         poses = products[:, k:-1, k:-1]
         poses[~poses.any(axis=(1, 2))] = np.eye(6)
         return cls(
@@ -87,6 +114,8 @@ class Equations:
             poses,
             products[:, :k, -1],
             products[:, k:-1, -1],
+            pull.information,
+            pull.right(state.values),
         )
 
     def only(self, parts: list[int]) -> Equations:
@@ -97,6 +126,8 @@ class Equations:
             self.poses[parts],
             self.camera_right[parts],
             self.poses_right[parts],
+            self.pull,
+            self.pull_right,
         )
 
     @property
@@ -108,20 +139,21 @@ class Equations:
     def step(self, damping: float) -> tuple[Floats, Floats] | None:
         """(changes of the values, of the poses (parts, 6)); None where the equations say
         nothing."""
-        camera = self.camera.sum(0)
+        camera = self.camera.sum(0) + self.pull
         camera += _diagonal(camera, damping)
         try:
             inverse = np.linalg.inv(self.poses + _diagonal(self.poses, damping))
             through = self.between @ inverse
             left = camera - (through @ self.between.swapaxes(1, 2)).sum(0)
-            values = _scaled_solve(left, self._right(through).sum(0))
+            values = _scaled_solve(left, self._right(through).sum(0) + self.pull_right)
         except np.linalg.LinAlgError:
             return None
         back = self.poses_right - values @ self.between
         return values, (inverse @ back[:, :, None])[:, :, 0]
 
     def eliminated(self) -> tuple[Floats, Floats]:
-        """Of the values alone, for each part: information (parts, k, k), right side (parts, k).
+        """Of the values alone, for each part: information (parts, k, k), right side (parts, k);
+        the pull not counted in.
 
         LinAlgError where a pose is open.
         """
@@ -133,7 +165,14 @@ class Equations:
 
 
 def _square(rows: Floats) -> Floats:
-    return np.asarray(rows.T @ rows)
+    """rows.T @ rows; most columns of a splined lens are 0 in any one view."""
+    columns = rows.shape[1]
+    if columns < MANY:
+        return np.asarray(rows.T @ rows)
+    used = np.flatnonzero(rows.any(axis=0))
+    square, some = np.zeros((columns, columns)), rows[:, used]
+    square[np.ix_(used, used)] = some.T @ some
+    return square
 
 
 def _diagonal(blocks: Floats, damping: float) -> Floats:

@@ -9,7 +9,7 @@ that stay: their squared distances must fall as the step says. Where not, it is 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,16 +38,36 @@ def cross_validate(solution: Solution, views: Sequence[View], freedom: Freedom) 
     The points that count are the solution's, which is taken to be the least-squares one over them.
     NaN with fewer than 3 views, and where those that are left do not determine the camera.
     """
+    return predicted_px(solution, views, camera_without(solution, views, freedom))
+
+
+def camera_without(
+    solution: Solution, views: Sequence[View], freedom: Freedom
+) -> Callable[[list[int]], Camera]:
+    """From the numbers of the views that are kept to the camera of these alone.
+
+    CalibrationError where they do not determine it.
+    """
+    if solution.pull:
+        return lambda kept: _solved_from(kept, solution, views, freedom)
+    whole = _Whole.of(solution, views, freedom)
+    return lambda kept: whole.camera_from(kept) or _solved_from(kept, solution, views, freedom)
+
+
+def predicted_px(
+    solution: Solution, views: Sequence[View], camera_of: Callable[[list[int]], Camera]
+) -> float:
+    """As `cross_validate`, of cameras that come from anywhere: `camera_of` gets the numbers of the
+    views that are kept."""
     used = [i for i, ok in enumerate(solution.inliers) if ok.any()]
     if len(used) < 3:
         return float("nan")
     folds, errors = min(FOLDS, len(used)), []
-    whole = _Whole.of(solution, views, freedom)
     for fold in range(folds):
         held_out = used[fold::folds]
         kept = [i for i in used if i not in held_out]
         try:
-            camera = whole.camera_from(kept) or _solved_from(kept, solution, views, freedom)
+            camera = camera_of(kept)
         except CalibrationError:
             return float("nan")
         counted = [solution.inliers[i] for i in held_out]
@@ -69,6 +89,7 @@ def _solved_from(
         counted=[solution.inliers[i] for i in kept],
         steps=STEPS,
         enough=ENOUGH,
+        pull=solution.pull,
     ).camera
 
 

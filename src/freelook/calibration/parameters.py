@@ -7,7 +7,15 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from ..camera import Camera
-from ..lens import Floats, Lens, Mei, OpenCVRational, vector, with_vector
+from ..lens import (
+    Floats,
+    Lens,
+    Mei,
+    OpenCVRational,
+    SplinedStereographic,
+    vector,
+    with_vector,
+)
 
 # Parameters that stay as they are (0): views of a board do not tell them from the others. OpenCV
 # and Kalibr leave the same ones out unless asked.
@@ -35,8 +43,16 @@ class Parameters:
     freedom: Freedom
 
     @property
+    def free(self) -> Freedom:
+        """What is free of this camera: the surface of a splined lens says centre, aspect and skew
+        itself."""
+        if isinstance(self.camera.lens, SplinedStereographic):
+            return Freedom(self.freedom.lens, center=False, aspect=False)
+        return self.freedom
+
+    @property
     def names(self) -> tuple[str, ...]:
-        free = self.freedom
+        free = self.free
         return (
             *(lens_names(self.camera.lens) if free.lens else ()),
             *(("center_x", "center_y") if free.center else ()),
@@ -46,7 +62,7 @@ class Parameters:
 
     @property
     def values(self) -> Floats:
-        free, camera = self.freedom, self.camera
+        free, camera = self.free, self.camera
         return np.array(
             [
                 *(lens_values(camera.lens) if free.lens else ()),
@@ -58,7 +74,7 @@ class Parameters:
 
     def camera_of(self, values: Floats) -> Camera:
         """The camera with these values instead of its own."""
-        free, lens = self.freedom, self.camera.lens
+        free, lens = self.free, self.camera.lens
         left = list(map(float, values))
         if free.lens:
             count = len(lens_names(lens))

@@ -1,7 +1,8 @@
 """Where points land, and how that changes with the point and with what is solved for.
 
 Round lenses need nothing but r(theta): its slope and what each parameter does to it are central
-differences of one curve, the rest is geometry. Lenses that are not round are differenced whole.
+differences of one curve, the rest is geometry. Splined ones are known in closed form (`_surface`).
+Other lenses that are not round are differenced whole.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import numpy as np
 
 from ..camera import Camera
 from ..lens import Floats, Lens, RadialSpline, radius_slope
+from ._surface import Surface, control_of, is_surface, stereographic, stereographic_slopes
 from .parameters import Parameters, difference_step, lens_values, with_lens_values
 
 if TYPE_CHECKING:
@@ -35,14 +37,20 @@ def project(camera: Camera, points: Floats) -> Floats:
 
     What lies out there is wrong anyway; a solver has to find its way back from it.
     """
-    polar = _Polar.of(points)
-    at = _lands(camera.lens, _is_bent(type(camera.lens)), polar)
+    if is_surface(lens := camera.lens):
+        surface = Surface.of(lens, u := stereographic(points))
+        if surface.inside.all():
+            at = lens.f * (u + surface.offset(control_of(lens)))
+            return np.asarray(camera.center) + at @ camera.stretch.T
+    at = _lands(camera.lens, _is_bent(type(camera.lens)), _Polar.of(points))
     return np.asarray(camera.center) + at @ camera.stretch.T
 
 
 def value_slopes(parameters: Parameters, values: Floats, points: Floats) -> Floats:
     """d pixel / d values (n, 2, k) of points (n, 3) in the camera frame."""
-    camera, free = parameters.camera_of(values), parameters.freedom
+    camera, free = parameters.camera_of(values), parameters.free
+    if is_surface(camera.lens):
+        return _surface_slopes(camera, points) if free.lens else np.zeros((len(points), 2, 0))
     bent, polar = _is_bent(type(camera.lens)), _Polar.of(points)
     columns: list[Floats] = []
     if free.lens:
@@ -58,6 +66,11 @@ def value_slopes(parameters: Parameters, values: Floats, points: Floats) -> Floa
 
 def point_slopes(camera: Camera, points: Floats) -> Floats:
     """d pixel / d point (n, 2, 3) of points (n, 3) in the camera frame."""
+    if is_surface(lens := camera.lens):
+        surface = Surface.of(lens, stereographic(points))
+        if surface.inside.all():
+            by_u = np.eye(2) + surface.offset_slopes(control_of(lens))
+            return np.asarray(lens.f * camera.stretch @ by_u @ stereographic_slopes(points))
     if _is_bent(type(camera.lens)):
         return _differences(lambda p: project(camera, p), points)
     return np.asarray(camera.stretch @ _round_slopes(camera.lens, _Polar.of(points)))
@@ -68,6 +81,18 @@ def cross_matrices(v: Floats) -> Floats:
     zero = np.zeros(len(v))
     x, y, z = v.T
     return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(-1, 3, 3)
+
+
+def _surface_slopes(camera: Camera, points: Floats) -> Floats:
+    """d pixel / d control (n, 2, 2 nx ny); beyond the control points, what their edge does."""
+    lens = camera.lens
+    assert is_surface(lens)
+    count = lens.nx * lens.ny
+    weights = Surface.of(lens, stereographic(points)).spread(count)
+    slopes = np.zeros((len(points), 2, count, 2))
+    for i, j in np.argwhere(camera.stretch):
+        slopes[:, i, :, j] = (lens.f * camera.stretch[i, j]) * weights
+    return slopes.reshape(len(points), 2, 2 * count)
 
 
 @dataclass(frozen=True)

@@ -100,6 +100,7 @@ def sentences(calibration: Calibration) -> list[str]:
             "taken into account; usual reasons are a board that is not quite flat, pictures taken "
             "in motion, and more than one camera or zoom"
         )
+    lines += free_form_sentences(calibration)
     lines += [f"weak: {doubt}" for doubt in calibration.doubts]
     if calibration.rejected:
         share = calibration.rejected / sum(len(v.pixels) for v in calibration.views)
@@ -108,6 +109,33 @@ def sentences(calibration: Calibration) -> list[str]:
     if solution.condition > 1e9:
         lines.append("the views hardly determine all parameters: add tilted ones near the rim")
     return lines + [weakness for weakness in weaknesses(calibration)]
+
+
+def free_form_sentences(calibration: Calibration) -> list[str]:
+    """How a free-form lens compares with the one it is pulled towards, and what it says where no
+    corner was seen."""
+    free = next((c for c in calibration.candidates if c.instead_of and c.solution), None)
+    if free is None:
+        return []
+    other = next(c for c in calibration.candidates if c.model == free.instead_of)
+    lines = []
+    if calibration.control:
+        across, down = calibration.control
+        lines.append(
+            f"{across} x {down} control points; where no corner was seen, they say what "
+            f"{other.model} says there"
+        )
+    fitted = f"({free.rms_px:.3f} against {other.rms_px:.3f} px)"
+    predicted = f"({free.cross_validated_px:.3f} against {other.cross_validated_px:.3f} px)"
+    if free.cross_validated_px < other.cross_validated_px:
+        lines.append(f"{free.model} predicts views left out better than {other.model} {predicted}")
+    elif free.cross_validated_px > other.cross_validated_px:
+        better = f": {other.model} is the better lens" if calibration.control else ""
+        lines.append(
+            f"overfit: {free.model} fits these views closer than {other.model} {fitted}, but "
+            f"predicts views left out worse {predicted}{better}"
+        )
+    return lines
 
 
 TOGETHER = 2.0  # below, it may be chance

@@ -44,6 +44,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="lens model, or auto: the one that predicts unseen views best",
     )
     parser.add_argument(
+        "--control",
+        type=size,
+        metavar="NxM",
+        help="control points of --model splined_stereographic, such as 16x12, instead of as many "
+        "as the corners can carry",
+    )
+    parser.add_argument(
         "--size", type=size, metavar="WxH", help="of the pictures, for corner files that lack it"
     )
     parser.add_argument("--skew", action="store_true", help="solve for skewed pixels too")
@@ -64,6 +71,8 @@ def run(args: argparse.Namespace) -> int:
     for path in (args.output, args.report):
         if path and Path(path).exists() and not args.overwrite:
             raise FreelookError(f"{path} exists; --overwrite replaces it")
+    if args.control and args.model != "splined_stereographic":
+        raise CalibrationError("--control goes with --model splined_stereographic")
     target = chosen_target(args)
     return run_live(args, target) if args.live else _run(args, target)
 
@@ -87,7 +96,13 @@ def _run(args: argparse.Namespace, target: Target) -> int:
         (lambda _: None) if args.json else (lambda what: print(f"solving: {what}", file=sys.stderr))
     )
     calibration = calibrate(
-        found.views, found.size, args.model, freedom, drop=not args.keep_all, progress=say
+        found.views,
+        found.size,
+        args.model,
+        freedom,
+        drop=not args.keep_all,
+        control=args.control,
+        progress=say,
     )
     calibration = with_turned_told(calibration, found.views)
     wrong_size = other_size(target, found.views, found.pictures)
@@ -154,9 +169,10 @@ def _print(calibration: Calibration, found: Found) -> None:
     from ..calibration.parameters import Parameters
 
     found_values = Parameters(solution.camera, calibration.freedom).values
-    for name, value, spread in zip(solution.names, found_values, sigma, strict=True):
-        values.add_row(name, f"{value:.6g}", f"{spread:.2g}")
-    console.print(values)
+    if not calibration.control:  # hundreds of them, and they say nothing by themselves
+        for name, value, spread in zip(solution.names, found_values, sigma, strict=True):
+            values.add_row(name, f"{value:.6g}", f"{spread:.2g}")
+        console.print(values)
     for line in sentences(calibration):
         print(line)
 

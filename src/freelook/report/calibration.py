@@ -107,6 +107,8 @@ def _rectified(calibration: Calibration, view: View, gray: Gray, index: int) -> 
 
 
 def _values(page: Page, calibration: Calibration) -> None:
+    if calibration.control:  # hundreds, that say nothing by themselves
+        return
     solution = calibration.solution
     values = Parameters(solution.camera, calibration.freedom).values
     sigma = np.sqrt(np.diag(solution.covariance))
