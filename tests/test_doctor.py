@@ -118,7 +118,20 @@ def test_decoders_and_software_encoders_are_there() -> None:
 
 def test_codec_that_does_not_exist_is_not_there() -> None:
     assert not doctor._has_codec("no_such_codec", "r")
-    assert not doctor._opens("no_such_encoder")
+
+
+def test_streams_are_encoded_by_the_first_hardware_that_works_or_by_the_cpu() -> None:
+    line = doctor.encoder_line("H.264", {"h264_nvenc": "no GPU", "h264_qsv": "", "h264_amf": ""})
+    assert (line.name, line.what) == ("H.264 streams", "encoded by h264_qsv, in hardware")
+    line = doctor.encoder_line("H.264", {"h264_nvenc": "no GPU"})
+    assert (line.state, "on the CPU" in line.what) == ("ok", True)
+    assert line.what.endswith("in vain: h264_nvenc")
+
+
+def test_rtsp_server_that_is_missing_says_what_to_install() -> None:
+    assert doctor.rtsp_server_line("/usr/bin/python3", "x").what.endswith("/usr/bin/python3")
+    line = doctor.rtsp_server_line(None, "some-package")
+    assert (line.state, line.todo.endswith("sudo apt install some-package")) == ("ok", True)
 
 
 def broken() -> Iterator[Check]:

@@ -28,7 +28,7 @@ State = Literal["ok", "warn", "no"]
 # what freelook cannot fly without; the other extras add to it
 ESSENTIAL_EXTRAS = ("render", "video", "web")
 EXTRAS = (*ESSENTIAL_EXTRAS, "rtsp", "cli", "gl", "window")
-HARDWARE_ENCODERS = ("h264_nvenc", "h264_vaapi", "h264_qsv", "h264_amf", "h264_videotoolbox")
+PROBED_SIZE = (1280, 720)
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "firefox", "microsoft-edge")
 PORTS = (
     ("tcp", 8042, "the page", "choose another: freelook fly --port N"),
@@ -116,9 +116,36 @@ def check_codecs() -> Iterator[Check]:
         todo = "" if found else "install PyAV's own wheels: pip install --force-reinstall av"
         needed = "264" in name
         yield Check(use, "ok" if found else "no", f"FFmpeg's {name}", todo, essential=needed)
-    opened = [name for name in HARDWARE_ENCODERS if _opens(name)]
-    found_text = ", ".join(opened) if opened else "none opens here"
-    yield Check("hardware encoders", "ok", f"{found_text} (not used today; x264 is)")
+    for codec, use in (("h264", "H.264"), ("hevc", "H.265")):
+        yield encoder_line(use, why_no_hardware(codec))
+
+
+def why_no_hardware(codec: str) -> dict[str, str]:
+    """FFmpeg's hardware encoders of this codec, each with why it is of no use (empty: it works)."""
+    hardware = import_module(".media.hardware", __package__)
+    names = [f"{codec}_{family}" for family in hardware.FAMILIES]
+    return {name: hardware.why_not(name, PROBED_SIZE) for name in names}
+
+
+def encoder_line(use: str, reasons: dict[str, str]) -> Check:
+    """Which encoder streams are made with."""
+    name = f"{use} streams"
+    found = next((library for library, why in reasons.items() if not why), None)
+    if found is not None:
+        return Check(name, "ok", f"encoded by {found}, in hardware")
+    return Check(name, "ok", f"encoded on the CPU; tried in vain: {', '.join(reasons)}")
+
+
+def check_rtsp_server() -> Iterator[Check]:
+    server = import_module(".sinks.rtspserver", __package__)
+    yield rtsp_server_line(server.python_with_gstreamer(), server.PACKAGES)
+
+
+def rtsp_server_line(python: str | None, packages: str) -> Check:
+    if python is not None:
+        return Check("RTSP server", "ok", f"GStreamer's, run by {python}")
+    todo = f"to let players pull the view: sudo apt install {packages}"
+    return Check("RTSP server", "ok", "none (needed only for stream:rtsp-server://)", todo)
 
 
 def _has_codec(name: str, mode: str) -> bool:
@@ -126,19 +153,6 @@ def _has_codec(name: str, mode: str) -> bool:
     try:
         av.codec.Codec(name, mode)
     except ValueError:
-        return False
-    return True
-
-
-def _opens(encoder: str) -> bool:
-    """Whether it really encodes here: many are compiled in and find no hardware."""
-    av = import_module("av")
-    try:
-        context = av.CodecContext.create(encoder, "w")
-        context.width, context.height, context.framerate = 320, 240, 30
-        context.pix_fmt = context.codec.video_formats[0].name
-        context.open()
-    except (ValueError, TypeError, av.FFmpegError):
         return False
     return True
 
@@ -260,6 +274,7 @@ CHECKS: tuple[Callable[[], Iterator[Check]], ...] = (
     check_python,
     check_libraries,
     check_codecs,
+    check_rtsp_server,
     check_graphics,
     check_processor,
     check_cameras,

@@ -81,3 +81,25 @@ def test_nobody_needs_to_listen() -> None:
     sink.close()
     assert sink.counters["sent"] == 3
     assert sink.counters["packets"] >= 3
+
+
+def test_a_receiver_that_asks_gets_a_key_picture() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+        receiver.bind(("127.0.0.1", 0))
+        receiver.settimeout(5)
+        sink = open_sink(f"rtp://127.0.0.1:{receiver.getsockname()[1]}", size=SIZE, color=COLOR)
+        assert isinstance(sink, RtpStream)
+        keys = []
+        for index in range(6):
+            sink.write(frame(index))
+            kinds, marker = set(), False
+            while not marker:
+                data, sender = receiver.recvfrom(2000)
+                kinds.add(data[12] & 31)
+                marker = bool(data[1] & 0x80)
+            keys.append(7 in kinds)  # a sequence parameter set
+            if index == 2:
+                receiver.sendto(bytes.fromhex("81ce00020000000100000002"), sender)
+        sink.close()
+    assert keys == [True, False, False, True, False, False]
+    assert sink.counters["keys_asked"] == 1

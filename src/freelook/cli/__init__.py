@@ -16,7 +16,7 @@ from .. import __version__
 from ..errors import FreelookError, MissingExtra
 
 COMMANDS = (
-    *("demo", "fly", "render", "simulate", "lens"),
+    *("demo", "fly", "snapshot", "render", "simulate", "lens"),
     *("calibrate", "calibrate board", "calibrate lines", "calibrate mount", "calibrate stereo"),
     *("track", "track send"),
     *("duel", "paper", "bench", "doctor"),

@@ -12,7 +12,7 @@ from pathlib import Path
 import cv2
 
 from ..errors import SinkError
-from ..types import Frame, Sink
+from ..types import Frame
 from . import SinkSettings, refuse
 from ._rgb import rgb24
 
@@ -35,7 +35,7 @@ def check(argument: str, settings: SinkSettings) -> None:
         raise SinkError(f"the folder {path.parent} does not exist; make it first")
 
 
-def open(argument: str, settings: SinkSettings) -> Sink:
+def open(argument: str, settings: SinkSettings) -> Snapshots:
     refuse(settings, "a snapshot", "audio_from", "sdp", "bitrate")
     check(argument, settings)
     return Snapshots(Path(argument))
@@ -43,9 +43,11 @@ def open(argument: str, settings: SinkSettings) -> Sink:
 
 class Snapshots:
     """Every frame becomes a PNG: a file is replaced by the next one, whole; in a folder each has
-    its own, named by the date and time (UTC). What `note` said goes into the file as text."""
+    its own, named by the date and time (UTC). What `note` said goes into the file as text.
+    `written` is the newest file."""
 
     def __init__(self, path: Path) -> None:
+        self.written: Path | None = None
         self._path = path
         self._facts: Mapping[str, str] = {}
 
@@ -62,6 +64,7 @@ class Snapshots:
         try:
             part.write_bytes(data)
             os.replace(part, target)
+            self.written = target
         except OSError as error:
             raise SinkError(f"{target}: {error.strerror}") from None
 
