@@ -196,18 +196,21 @@ def interpolation_error(nodes: F32, t_max: float) -> float:
     """How far cubic interpolation between nodes strays, in pixels, where the lens sees.
 
     In the middle of four equally spaced nodes a smooth function strays from their cubic by
-    3/128 of its fourth difference; both directions add up.
+    3/128 of its fourth difference; both directions add up. On the border it is that of the
+    nearest node that has one.
     """
     worst = np.float32(0.0)
-    for row in range(2, nodes.shape[1] - 2):
-        for column in range(2, nodes.shape[2] - 2):
+    for row in range(1, nodes.shape[1] - 1):
+        j = min(max(row, 2), nodes.shape[1] - 3)
+        for column in range(1, nodes.shape[2] - 1):
             if nodes[2, row, column] <= t_max:
+                i = min(max(column, 2), nodes.shape[2] - 3)
                 for k in range(2):
                     n = nodes[k]
-                    across = n[row, column - 2] - 4 * n[row, column - 1] + 6 * n[row, column]
-                    across += n[row, column + 2] - 4 * n[row, column + 1]
-                    down = n[row - 2, column] - 4 * n[row - 1, column] + 6 * n[row, column]
-                    down += n[row + 2, column] - 4 * n[row + 1, column]
+                    across = n[row, i - 2] - 4 * n[row, i - 1] + 6 * n[row, i]
+                    across += n[row, i + 2] - 4 * n[row, i + 1]
+                    down = n[j - 2, column] - 4 * n[j - 1, column] + 6 * n[j, column]
+                    down += n[j + 2, column] - 4 * n[j + 1, column]
                     worst = max(worst, abs(across) + abs(down))
     return float(worst) * 3 / 128
 
