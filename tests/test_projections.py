@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -147,6 +149,15 @@ def test_views_higher_than_their_projection_are_refused_with_the_height_that_is_
     assert Viewport((1280, 640), 360, "equirectangular").vfov_deg == pytest.approx(180)
     with pytest.raises(RenderError, match="at most 320 pixels"):
         Viewport((1280, 321), 360, "strip")
+
+
+@pytest.mark.parametrize("kind", ALL, ids=lambda kind: kind.name)
+def test_the_documentation_has_its_limits(kind: Projection) -> None:
+    page = (Path(__file__).parent.parent / "docs" / "views.md").read_text("utf-8")
+    row = next(line for line in page.splitlines() if line.startswith(f"| `{kind.name}` | 1"))
+    limits = f"{kind.narrowest_deg} to {kind.widest_deg}"
+    limits += "" if kind.tallest_deg is None else f", at most {kind.tallest_deg} high"
+    assert limits in row
 
 
 def test_unknown_projections_are_told_the_known_ones() -> None:

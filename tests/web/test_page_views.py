@@ -59,12 +59,14 @@ def test_rays_places_and_limits_are_those_of_the_definition(view: PageView) -> N
     """What the page computes without the shader: lines over the picture, zoom and soft stop."""
     script = """async view => {
       const { placeOf, rayOf } = await import('./static/projections.js');
+      const { PROJECTIONS } = await import('./static/projections.js');
       const { focalPx } = await import('./static/viewport.js');
       const { reachOf } = await import('./static/limit.js');
       const ray = rayOf(view.projection, 0.7, -0.4);
       return {
         ray, place: placeOf(view.projection, ray), focal: focalPx(view),
         reach: reachOf([0.6, 0.8], view, 1.9),
+        tallest: PROJECTIONS[view.projection].tallestDeg ?? null,
       };
     }"""
     for shown in VIEWS:
@@ -76,6 +78,7 @@ def test_rays_places_and_limits_are_those_of_the_definition(view: PageView) -> N
         np.testing.assert_allclose(found["ray"], kind.ray(np.array(0.7), np.array(-0.4)), atol=1e-9)
         np.testing.assert_allclose(found["place"], [0.7, -0.4], atol=1e-9)
         assert found["focal"] == pytest.approx(shown.focal_px)
+        assert found["tallest"] == kind.tallest_deg
         assert found["reach"] == pytest.approx(reach_of((0.6, 0.8), shown, 1.9), abs=1e-6)
 
 
