@@ -32,6 +32,7 @@ RATES_HZ = {"snapshot": 0.1, "terminal": 10.0}
 SINKS = {"file": "video", "snapshot": "snapshot", "terminal": "terminal"}
 SINKS |= {"virtual-camera": "virtual-camera"}
 STREAMS = ("rtp", "udp", "rtsp-server", "rtsp")
+CODED = ("stream", "file")  # in which four pixels share a colour
 # another attempt may help where the other end can come back, not where a file broke off
 TRIED_AGAIN = ("stream", "snapshot", "virtual-camera")
 
@@ -47,6 +48,7 @@ class Flight:
     stabiliser: Stabiliser
     renderer: Callable[[], Renderer]
     hfov_deg: float = 90.0
+    projection: str = "perspective"
     soft_limit: bool = False
     state: Callable[[], str] = str
     clock: Clock = now_ns
@@ -90,17 +92,25 @@ class Outputs:
         return bool(self.outputs) and all(output.failed for output in self.outputs)
 
 
+def view_of(spec: OutputSpec, flight: Flight) -> Viewport:
+    """RenderError for a view that cannot be."""
+    size = settings_of(spec, ColorSpace()).size
+    projection = spec.projection or flight.projection
+    return Viewport(size, spec.hfov_deg or flight.hfov_deg, projection)
+
+
 def check(spec: OutputSpec, flight: Flight) -> None:
     """What can be known to be wrong before there is a picture."""
     settings = settings_of(spec, ColorSpace())
-    Viewport(settings.size, spec.hfov_deg or flight.hfov_deg)
+    view_of(spec, flight)
+    if spec.kind in CODED and any(side % 2 for side in settings.size):
+        raise SinkError(f"--show {spec.text}: video needs an even width and height")
     aim_of(spec, flight)
     check_sink(sink_argument(spec), settings)
 
 
 def make_output(spec: OutputSpec, flight: Flight) -> Output:
-    size = settings_of(spec, ColorSpace()).size
-    viewport = Viewport(size, spec.hfov_deg or flight.hfov_deg)
+    viewport = view_of(spec, flight)
     limit = LensLimit(flight.camera) if flight.soft_limit else None
     aim, camera = aim_of(spec, flight), flight.camera
     lens = write(Profile(camera))

@@ -11,10 +11,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ..errors import SinkError
+from ..projections import PROJECTIONS
 from ..sinks import By
 
 LOOK = ("yaw", "pitch", "roll")
-VIEW = ("size", "hfov", "head", *LOOK)
+VIEW = ("size", "hfov", "projection", "head", *LOOK)
 ENCODERS: tuple[By, ...] = ("auto", "software", "hardware")
 CODECS = ("h264", "h265")
 
@@ -25,7 +26,7 @@ KINDS: dict[str, tuple[bool, tuple[str, ...]]] = {
     "stream": (True, (*VIEW, "fps", "codec", "bitrate", "encoder", "sdp")),
     "file": (True, (*VIEW, "fps", "codec", "overwrite")),
     "snapshot": (True, (*VIEW, "every")),
-    "terminal": (False, ("hfov", "head", *LOOK, "fps")),
+    "terminal": (False, ("hfov", "projection", "head", *LOOK, "fps")),
     "virtual-camera": (False, (*VIEW, "fps")),
 }
 
@@ -43,6 +44,7 @@ class OutputSpec:
     text: str = ""
     size: tuple[int, int] | None = None
     hfov_deg: float | None = None
+    projection: str | None = None
     head: str | None = None
     look_deg: tuple[float, float, float] | None = None
     rate_hz: float | None = None
@@ -177,7 +179,8 @@ def _some_text(text: str) -> str:
 
 READERS: dict[str, Callable[[str], Any]] = {
     "size": _size,
-    "hfov": _between(10, 150, "degrees"),
+    "hfov": _between(10, 360, "degrees"),
+    "projection": _one_of(tuple(PROJECTIONS)),
     "head": _some_text,
     "yaw": _number,
     "pitch": _number,
