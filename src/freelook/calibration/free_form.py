@@ -4,9 +4,10 @@ The surface (`SplinedStereographic`, mrcal's) has hundreds of control points, an
 anything about most of them. So they are pulled: not, as in mrcal, towards a stereographic lens
 (0.0025 of the points' number in squared pixels for a typical correction of 0.2, ten times as
 stiffly across as along the radius: its `mrcal.c`, "Regularization"), but towards what the best lens
-of a few parameters says. Where no corner was seen, the result is that lens. The pull is that of
-control points which are beside it by `TYPICAL_PX`, in any direction: the posterior of a normal
-prior, so that what is stated as uncertain is that too.
+of a few parameters says. Where no corner was seen, the result is near that lens. Expected beside
+it are polynomials over the surface, for what it misses at large (`LARGE_PX`), and anything else,
+point by point, far smaller (`SMALL_PX`). The pull is a normal prior of that covariance, so that the
+stated uncertainty takes it in.
 
 Centre, aspect and focal length stay: the surface says them itself. A turn of the camera and of all
 poses against it is left to the pull, and to `uncertainty`, which takes out what nobody sees.
@@ -37,7 +38,8 @@ COARSE = (10, 8)  # for a first look
 POINTS_EACH = 4  # as many points seen for each control point
 FEWEST_CONTROL = ORDER + 2
 WIDEST_DEG = 355
-TYPICAL_PX = 3.0
+LARGE_PX, LARGE_DEGREE = 5.0, 4
+SMALL_PX = 1.0
 STEPS, ENOUGH = 20, 1e-6
 ROUGHLY = 1e-4  # relative gain of the last step, where a camera is only asked what it predicts
 DENSE = 4  # places along each side of a cell, to fit a surface to a lens
@@ -162,8 +164,21 @@ def pulled_to(start: Solution, views: Sequence[View], control: Control) -> tuple
     limit = min(growth_limit(camera.lens), seen_angle(start, views) + MARGIN)
     expected = _nearest(lens, camera, limit)
     lens = replace(lens, control=tuple(map(float, expected)))
-    stiff = (start.noise_px * lens.f / TYPICAL_PX) ** 2
-    return replace(camera, lens=lens), Pull(expected, stiff * np.eye(len(expected)))
+    stiff = (start.noise_px * lens.f) ** 2 * np.linalg.inv(_expected_px(lens))
+    return replace(camera, lens=lens), Pull(expected, np.kron(stiff, np.eye(2)))
+
+
+def _expected_px(lens: SplinedStereographic) -> Floats:
+    """The covariance (nx ny, nx ny) of control points beside what is expected, pixels squared, the
+    same in x and y."""
+    down, across = (np.linspace(-1, 1, n) for n in (lens.ny, lens.nx))
+    some = range(LARGE_DEGREE + 1)
+    degrees = [(i, j) for i in some for j in some if 0 < i + j <= LARGE_DEGREE]
+    # without the constant: a shift of everything is a turn of the camera, which nobody sees
+    smooth = [np.outer(down**j, across**i).ravel() for i, j in degrees]
+    shapes = np.linalg.qr(np.stack(smooth, axis=-1))[0]  # as good as each other, none counted twice
+    large = LARGE_PX**2 * len(shapes) / shapes.shape[1]
+    return np.asarray(large * shapes @ shapes.T + SMALL_PX**2 * np.eye(len(shapes)))
 
 
 def _reach(start: Solution, views: Sequence[View]) -> Floats:
