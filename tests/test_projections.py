@@ -10,7 +10,7 @@ import pytest
 from freelook.errors import RenderError
 from freelook.lens import Floats
 from freelook.projections import PROJECTIONS, Projection
-from freelook.viewport import Viewport
+from freelook.viewport import Viewport, fitting
 
 BY_RAYS = [kind for kind in PROJECTIONS.values() if not kind.cut]
 ALL = list(PROJECTIONS.values())
@@ -149,6 +149,16 @@ def test_views_higher_than_their_projection_are_refused_with_the_height_that_is_
     assert Viewport((1280, 640), 360, "equirectangular").vfov_deg == pytest.approx(180)
     with pytest.raises(RenderError, match="at most 320 pixels"):
         Viewport((1280, 321), 360, "strip")
+
+
+def test_views_that_must_fit_get_the_nearest_field_that_is_possible() -> None:
+    assert fitting((640, 320), 400, "cylindrical").hfov_deg == 360
+    assert fitting((640, 320), 5, "pannini").hfov_deg == 10
+    assert fitting((640, 320), 90, "perspective").hfov_deg == 90
+    high = fitting((1280, 720), 360, "equirectangular")
+    assert (high.hfov_deg, high.vfov_deg) == (pytest.approx(320), pytest.approx(180))
+    with pytest.raises(RenderError, match="at most 640 pixels"):
+        fitting((1280, 720), 360, "strip")
 
 
 @pytest.mark.parametrize("kind", ALL, ids=lambda kind: kind.name)

@@ -97,3 +97,16 @@ class Viewport:
         sides = [(along, -ends), (along, ends), (-ends, along), (ends, along)]
         edge = np.concatenate([np.stack(side, axis=-1) for side in sides])
         return self.rays_at((edge + 0.5) * self.size - 0.5)
+
+
+def fitting(size: tuple[int, int], hfov_deg: float, projection: str) -> Viewport:
+    """The view with the field nearest to this that its projection allows in this size.
+
+    RenderError where none is: a strip in a window that is too high for it.
+    """
+    kind = projection_named(projection)
+    widest_deg = kind.widest_deg
+    if kind.tallest_deg is not None:
+        focal_px = size[1] / 2 / kind.half_height(kind.tallest_deg / 2)
+        widest_deg = min(widest_deg, 2 * kind.angle_deg(size[0] / 2 / focal_px, 0.0))
+    return Viewport(size, max(kind.narrowest_deg, min(widest_deg, hfov_deg)), projection)

@@ -8,14 +8,16 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.ndimage import binary_erosion
 
 from freelook.camera import make_camera
 from freelook.errors import MissingExtra, RenderError, SinkError
 from freelook.lens import Equidistant
 from freelook.renderers.gl_context import open_context
+from freelook.renderers.reference import ReferenceRenderer, coordinates
 from freelook.rotations import RDF_FROM_FRD, body_from_view
 from freelook.types import ColorSpace, Picture
-from freelook.viewport import Viewport
+from freelook.viewport import Viewport, fitting
 from freelook.window.eyes import Eye, Layout, Optics, eyes
 from freelook.window.painting import EyesPainter
 
@@ -45,11 +47,15 @@ def smooth_picture() -> Picture:
 
 
 def painted(
-    context: Any, optics: Optics, size: tuple[int, int] = SIZE, hfov_deg: float = 80.0
+    context: Any,
+    optics: Optics,
+    size: tuple[int, int] = SIZE,
+    hfov_deg: float = 80.0,
+    projection: str = "perspective",
 ) -> Rgb:
     """As a window of this size would show it, (rows, columns, 3) from the top."""
     target = context.framebuffer([context.texture(size, 3)])
-    painter = EyesPainter(context, optics)
+    painter = EyesPainter(context, optics, projection=projection)
     painter.load(smooth_picture(), CAMERA, size, hfov_deg)
     painter.paint(target, size, CAMERA, AHEAD, hfov_deg)
     data = np.frombuffer(target.read(components=3, alignment=1), np.uint8)
@@ -137,3 +143,19 @@ def test_a_lost_video_is_grey(context: Any) -> None:
     data = np.frombuffer(target.read(components=3, alignment=1), np.uint8).reshape(-1, 3)
     assert (np.ptp(data, axis=1) == 0).all()
     assert data.std() > 5
+
+
+@pytest.mark.parametrize(
+    ("projection", "hfov_deg"), [("stereographic", 170.0), ("equirectangular", 360.0)]
+)
+def test_windows_show_other_projections_as_wide_as_they_may_be(
+    context: Any, projection: str, hfov_deg: float
+) -> None:
+    """Two codes: those of the renderers' own tests. An upright window narrows what is too high."""
+    size = (120, 100)
+    shown = painted(context, Optics(), size, hfov_deg, projection)
+    view = fitting(size, hfov_deg, projection)
+    exact = ReferenceRenderer().render(smooth_picture(), CAMERA, AHEAD, view).planes[0]
+    seen = binary_erosion(~np.isnan(coordinates(CAMERA, AHEAD, view)[..., 0]), iterations=2)
+    assert seen.mean() > 0.3
+    assert np.abs(shown.astype(int) - exact)[seen].max() <= 2

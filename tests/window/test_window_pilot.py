@@ -115,6 +115,9 @@ def test_wheel_and_keys_zoom_as_far_as_views_go() -> None:
     assert pilot.hfov_deg == pytest.approx(min(2 * 90 / 1.1, WIDEST_DEG))
     held(pilot, "+", seconds=9)
     assert pilot.hfov_deg == NARROWEST_DEG
+    wide = Pilot({}, 90.0, projection="stereographic")
+    held(wide, "-", seconds=9)
+    assert wide.hfov_deg == 300
 
 
 @pytest.mark.parametrize(

@@ -37,9 +37,9 @@ def add_show_argument(parser: argparse.ArgumentParser) -> None:
         metavar="KIND[:WHERE][,KEY=VALUE...]",
         help="page (the default; for browsers), window, stream:URL (rtp, udp), file:PATH, "
         "snapshot:PATH, terminal or virtual-camera; can be given again. Keys: size=1280x720, "
-        "hfov=90, head=NAME (of a tracker), yaw=, pitch=, roll= (a fixed direction), fps=, "
-        "bitrate=4M, codec=h264|h265, encoder=auto|software|hardware, sdp=FILE, every=SECONDS, "
-        "overwrite",
+        "hfov=90, projection=NAME, head=NAME (of a tracker), yaw=, pitch=, roll= (a fixed "
+        "direction), fps=, bitrate=4M, codec=h264|h265, "
+        "encoder=auto|software|hardware, sdp=FILE, every=SECONDS, overwrite",
     )
 
 
@@ -120,6 +120,7 @@ def _outputs(
         stabiliser,
         renderer_maker(args),
         hfov_deg=args.hfov,
+        projection=args.projection,
         soft_limit=args.limit == "soft",
         state=lambda: line.newest,
     )

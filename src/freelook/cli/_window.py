@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING
 
 from ..camera import Camera
 from ..clock import now_ns
+from ..errors import RenderError
 from ..gimbal import LensLimit
+from ..viewport import Viewport
 from ._arguments import size
 from ._progress import say
 from ._shows import FlightLine, shown_outputs
@@ -87,6 +89,11 @@ def fly_in_window(
     from ..window.surface import Surface
     from .fly import gimbal_for, open_heads
 
+    if args.projection == "strip":
+        raise RenderError(
+            "a strip is lower than a window; take --projection equirectangular, or --show page"
+        )
+    view = Viewport((640, 64), window.hfov_deg or args.hfov, args.projection)  # within its limits
     optics = Optics(args.eyes, args.eye_offset, args.viewer_lens)
     vehicle = vehicle_for(args, ingest, camera)
     with contextlib.ExitStack() as opened:
@@ -109,7 +116,7 @@ def fly_in_window(
             head.start()
         report = _report(ingest, vehicle, heads, line, outputs)
         outside = Outside(now_ns, opened.enter_context(asked_to_stop()), report)
-        pilot = Pilot(heads, window.hfov_deg or args.hfov, vehicle.stabiliser)
+        pilot = Pilot(heads, view.hfov_deg, vehicle.stabiliser, args.projection)
         limit = LensLimit(camera) if args.limit == "soft" else None
         flight = Flight(surface, frames, camera, pilot, outside, optics, args.sampling, limit)
         opened.callback(lambda: say(summary(flight.figures)))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -78,10 +76,11 @@ def _finest_px_per_rad(camera: Camera) -> float:
 
 
 def _coarsest_rad_per_px(viewport: Viewport) -> float:
-    """Between the rays of a small view of the same field: right for any projection."""
+    """Between rays spread evenly over the view: right for any projection."""
     width, height = viewport.size
-    small = replace(viewport, size=(min(width, 33), max(2, round(min(width, 33) * height / width))))
-    rays = small.rays()
+    across, down = (np.linspace(0, side - 1, min(side, 33)) for side in (width, height))
+    rays = viewport.rays_at(np.stack(np.meshgrid(across, down), axis=-1))
     rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
-    apart = [np.linalg.norm(np.diff(rays, axis=axis), axis=-1).max() for axis in (0, 1)]
-    return float(max(apart)) * small.size[0] / width
+    steps = [(0, down[1] - down[0]), (1, across[1] - across[0])]
+    apart = [np.linalg.norm(np.diff(rays, axis=axis), axis=-1).max() / px for axis, px in steps]
+    return float(max(apart))

@@ -65,7 +65,7 @@ class Flight:
         self._pilot = pilot
         self._outside = outside
         self._optics = Optics() if optics is None else optics
-        self._painter = EyesPainter(surface.context, self._optics, sampling)
+        self._painter = EyesPainter(surface.context, self._optics, sampling, pilot.projection)
         self._pacer = Pacer(period_ns(surface.refresh_hz))
         self._frame: Frame | None = None
         self._shown: tuple[object, ...] = ()

@@ -10,7 +10,7 @@ from ..camera import Camera
 from ..renderers.blank import Sampling
 from ..renderers.gl_painter import Painter
 from ..types import Picture
-from ..viewport import Viewport
+from ..viewport import Viewport, fitting
 from .eyes import Eye, Optics, eyes
 
 
@@ -18,17 +18,22 @@ class EyesPainter:
     """Draws the newest picture in one direction for every eye. Its context must be current."""
 
     def __init__(
-        self, context: Any, optics: Optics | None = None, sampling: Sampling = "bilinear"
+        self,
+        context: Any,
+        optics: Optics | None = None,
+        sampling: Sampling = "bilinear",
+        projection: str = "perspective",
     ) -> None:
         self._context = context
+        self._projection = projection
         self._optics = Optics() if optics is None else optics
         self._painter = Painter(context, sampling)
         self._viewport = Viewport((4, 4))
 
     def viewport(self, size: tuple[int, int], hfov_deg: float) -> Viewport:
-        """Of each eye, in a window of this size."""
+        """Of each eye, in a window of this size; no wider than its projection allows there."""
         eye = eyes(self._optics, size)[0]
-        wanted = Viewport((eye.width, eye.height), hfov_deg)
+        wanted = fitting((eye.width, eye.height), hfov_deg, self._projection)
         if wanted != self._viewport:  # else the same one: what is known of it is kept
             self._viewport = wanted
         return self._viewport

@@ -18,8 +18,9 @@ from ..gimbal import CENTRE, MODES, Stabiliser
 from ..gimbal.easing import Blend, blend
 from ..gimbal.settings import RATE_DEG_S
 from ..head import Head
+from ..projections import projection_named
 from ..rotations import body_from_view, head_angles_deg
-from ..viewport import NARROWEST_DEG, WIDEST_DEG, Viewport
+from ..viewport import fitting
 from .events import Damaged, Drag, Event, Key, Left, Pad, Wheel
 
 LOOK_PER_S = 0.8  # of the field of view, with a key held
@@ -48,9 +49,14 @@ class Pilot:
     their gimbals use; the hand turns in its base too."""
 
     def __init__(
-        self, heads: Mapping[str, Head], hfov_deg: float, stabiliser: Stabiliser | None = None
+        self,
+        heads: Mapping[str, Head],
+        hfov_deg: float,
+        stabiliser: Stabiliser | None = None,
+        projection: str = "perspective",
     ) -> None:
         self.hfov_deg = hfov_deg
+        self.projection = projection
         self._stabiliser = Stabiliser() if stabiliser is None else stabiliser
         self._heads = dict(heads)
         self._tracker = next(iter(self._heads), None)
@@ -116,7 +122,8 @@ class Pilot:
 
     def zoom(self, factor: float) -> None:
         """Above 1: wider, as far as views go."""
-        self.hfov_deg = min(max(self.hfov_deg * factor, NARROWEST_DEG), WIDEST_DEG)
+        kind = projection_named(self.projection)
+        self.hfov_deg = min(max(self.hfov_deg * factor, kind.narrowest_deg), kind.widest_deg)
 
     def recentre(self, now_ns: int) -> None:
         """Where the head points now becomes straight ahead; the hand goes there."""
@@ -171,7 +178,7 @@ class Pilot:
 
     def _drag(self, drag: Drag, now_ns: int, size: tuple[int, int]) -> None:
         """The picture follows the mouse; exactly so in the middle of the view."""
-        deg_per_px = float(np.degrees(1 / Viewport(size, self.hfov_deg).focal_px))
+        deg_per_px = float(np.degrees(1 / fitting(size, self.hfov_deg, self.projection).focal_px))
         self._take_over(now_ns)
         level = max(float(np.cos(np.radians(self._pitch_deg))), STEEP)
         self._turn(-drag.dx_px * deg_per_px / level, drag.dy_px * deg_per_px, now_ns)
