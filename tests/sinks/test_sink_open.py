@@ -21,6 +21,7 @@ EXAMPLES = {
     "rtsp": "rtsp://127.0.0.1:8554/view",
     "rtsp-server": "rtsp-server://127.0.0.1:8554",
     "terminal": "terminal",
+    "whip": "whip+http://127.0.0.1:8889/view/whip",
     "snapshot": "shots/",
     "virtual-camera": "virtual-camera",
 }
@@ -51,7 +52,7 @@ def test_unknown_arguments_list_what_is_known(argument: str) -> None:
 
 
 # these need something of the system, and have their own tests
-NEEDY = {"virtual-camera", "rtsp", "rtsp-server"}
+NEEDY = {"virtual-camera", "rtsp", "rtsp-server", "whip"}
 
 
 @pytest.mark.parametrize("kind", sorted(set(EXAMPLES) - NEEDY))

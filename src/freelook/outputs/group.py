@@ -31,7 +31,7 @@ RATES_HZ = {"snapshot": 0.1, "terminal": 10.0}
 # SINK: the module that writes a kind, where the argument does not say so itself
 SINKS = {"file": "video", "snapshot": "snapshot", "terminal": "terminal"}
 SINKS |= {"virtual-camera": "virtual-camera"}
-STREAMS = ("rtp", "udp", "rtsp-server", "rtsp")
+STREAMS = ("rtp", "udp", "rtsp-server", "rtsp", "whip")
 CODED = ("stream", "file")  # in which four pixels share a colour
 # another attempt may help where the other end can come back, not where a file broke off
 TRIED_AGAIN = ("stream", "snapshot", "virtual-camera")

@@ -24,7 +24,9 @@ PREFIX = "freelook:"
 
 
 def recognises(argument: str) -> bool:
-    return argument.endswith("/")  # a .png is a single picture, unless asked for as snapshot:
+    return (
+        argument.endswith("/") and "://" not in argument
+    )  # a .png is a single picture, unless asked for as snapshot:
 
 
 def check(argument: str, settings: SinkSettings) -> None:
