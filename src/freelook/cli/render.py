@@ -25,6 +25,8 @@ from ..errors import FreelookError, SourceError
 from ..gimbal import LensLimit
 from ..mailbox import Mailbox
 from ..pose_script import read_script
+from ..renderers import Renderer
+from ..renderers.layout import LAYOUTS, LayoutRenderer
 from ..rotations import body_from_view
 from ..session import Session
 from ..types import ColorSpace, Frame
@@ -62,6 +64,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--size", type=size, default=(1280, 720), metavar="WxH", help="of the view (1280x720)"
     )
+    parser.add_argument(
+        "--layout",
+        choices=("single", *LAYOUTS),
+        default="single",
+        help="several views in one picture: quad (also ahead, left, right), pip (with the whole "
+        "fisheye), panorama (below a strip all around)",
+    )
     add_mode_arguments(parser)
     add_stabilize_arguments(parser)
     add_renderer_arguments(parser)
@@ -83,6 +92,11 @@ def run(args: argparse.Namespace) -> int:
         _render_video(args, camera, aim, viewport)
     aim.report(args.output)
     return 0
+
+
+def _renderer(args: argparse.Namespace) -> Renderer:
+    renderer = opened_renderer(args)
+    return renderer if args.layout == "single" else LayoutRenderer(renderer, args.layout)
 
 
 def _look(args: argparse.Namespace) -> Callable[[int], Rotation]:
@@ -152,7 +166,7 @@ def _write(
 
     mailbox: Mailbox[Frame] = Mailbox()
     limit = LensLimit(camera) if args.limit == "soft" else None
-    session = Session(mailbox, camera, aim, opened_renderer(args), viewport, limit)
+    session = Session(mailbox, camera, aim, _renderer(args), viewport, limit)
     sink = open_sink(
         args.output,
         size=viewport.size,
