@@ -23,9 +23,10 @@ from freelook.gimbal import (
     soft_stop,
     zoom_limits,
 )
-from freelook.gimbal.limits import half_sides, reach, softened
+from freelook.gimbal.limits import half_sides, reach, reach_of, softened
 from freelook.gimbal.zoom import MOST_ENLARGED
 from freelook.lens import Equidistant
+from freelook.projections import PROJECTIONS
 from freelook.resolution import resolution_at
 from freelook.rotations import angle_between_deg, body_from_view, head_angles_deg
 from freelook.types import Pose
@@ -223,3 +224,24 @@ def test_zoom_is_limited_by_the_lens_and_by_what_a_view_can_be() -> None:
     limits = zoom_limits(blurred, 4000)
     assert limits.narrowest_deg == limits.widest_deg == pytest.approx(100)
     assert zoom_limits(camera_of(), 1280).clamp(3) == zoom_limits(camera_of(), 1280).narrowest_deg
+
+
+@pytest.mark.parametrize("name", PROJECTIONS)
+@pytest.mark.parametrize("half_deg", [70.0, 95.0, 120.0])
+def test_views_of_every_projection_just_touch_the_edge_at_their_limit(
+    name: str, half_deg: float
+) -> None:
+    """A hundredth of a degree is what points of the border may miss between them."""
+    kind, theta_max = PROJECTIONS[name], np.radians(half_deg)
+    viewport = Viewport((300, 100), max(kind.narrowest_deg, 100.0), name)
+    for side_deg in (0, 35, 90, 200):
+        side = np.radians(side_deg)
+        outward = (float(np.cos(side)), float(np.sin(side)))
+        limit = reach_of(outward, viewport, theta_max)
+        if kind.cut:
+            assert limit == theta_max
+            continue
+        turn = Rotation.from_rotvec(limit * np.array([-outward[1], outward[0], 0.0]))
+        ray = turn.apply(viewport.border(200))
+        off_axis = np.degrees(np.arctan2(np.hypot(ray[:, 0], ray[:, 1]), ray[:, 2])).max()
+        assert off_axis == pytest.approx(half_deg, abs=0.02) or (limit == 0 and name == "strip")
