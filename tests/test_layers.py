@@ -30,7 +30,7 @@ LAYERS: list[set[str]] = [
     | {"alignment", "stabilisation", "resolution", "view_cost", "comparison", "duel"},
     {"sources", "trackers", "attitudes", "sinks", "formats"},
     {"ingest", "head", "vehicle", "offset_finder", "session", "offline"},
-    {"cli", "web", "window", "outputs", "bench", "paper", "report", "doctor", "egl"},
+    {"cli", "web", "window", "outputs", "processes", "bench", "paper", "report", "doctor", "egl"},
 ]
 LAYER_OF = {name: number for number, names in enumerate(LAYERS) for name in names}
 PLUG_INS = LAYERS[3]

@@ -21,6 +21,7 @@ from collections.abc import Callable, Sequence
 from ..errors import SinkError
 from ..types import AccessUnit
 
+PROCESSES = "freelook.processes"  # the package of those that are ours
 HEADER = struct.Struct(">QBI")
 READY_S = 10.0
 FULL_S = 1.0  # a pipe that stays full so long belongs to a program that hangs
@@ -37,7 +38,8 @@ class Child:
     ) -> None:
         self._argument = argument
         self._heard = heard
-        self._ready = threading.Event()
+        self._ready = False
+        self._spoke = threading.Event()
         self._words: deque[str] = deque(maxlen=LAST_LINES)
         pipe = subprocess.PIPE
         try:
@@ -62,8 +64,8 @@ class Child:
 
     def wait_ready(self, seconds: float = READY_S) -> None:
         """Until it says so."""
-        self._ready.wait(seconds)  # also when it ended
-        if self._process.poll() is not None or not self._ready.is_set():
+        self._spoke.wait(seconds)  # also when it ended
+        if self._process.poll() is not None or not self._ready:
             raise SinkError(f"{self._argument}: {self._why()}")
 
     def send(self, unit: AccessUnit) -> None:
@@ -108,10 +110,11 @@ class Child:
         for line in self._process.stdout:
             words = line.decode(errors="replace").strip()
             if words == "ready":
-                self._ready.set()
+                self._ready = True
+                self._spoke.set()
             else:
                 self._heard(words)
-        self._ready.set()
+        self._spoke.set()
 
     def _remember(self) -> None:
         assert self._process.stderr is not None

@@ -8,12 +8,13 @@ from urllib.parse import urlsplit
 from ..errors import SinkError
 from ..types import Frame, Sink
 from . import SinkSettings, refuse
-from ._child import Child
+from ._child import PROCESSES, Child
 from ._live import LiveEncoder
 
 KIND = "rtsp"
 
 USUAL_PORT = 554
+PUBLISH = f"{PROCESSES}.publish"
 
 
 def recognises(argument: str) -> bool:
@@ -49,8 +50,7 @@ class Published:
         self._encoder = LiveEncoder(argument, settings)
         self.counters = self._encoder.counters
         width, height = map(str, settings.size)
-        module = f"{__package__}._publish"
-        command = [sys.executable, "-m", module, argument, self._encoder.codec, width, height]
+        command = [sys.executable, "-m", PUBLISH, argument, self._encoder.codec, width, height]
         self._child = Child(argument, command)
         try:
             self._child.wait_ready()

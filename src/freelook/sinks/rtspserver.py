@@ -16,7 +16,7 @@ from ._live import LiveEncoder, host_and_port
 
 KIND = "rtsp-server"
 
-HELPER = Path(__file__).with_name("_gst_rtsp_server.py")
+HELPER = Path(__file__).parents[1] / "processes" / "gst_rtsp_server.py"
 # freelook's own Python rarely has GStreamer; the system's has what apt installs
 PYTHONS = (sys.executable, "/usr/bin/python3")
 PROBE = (

@@ -24,9 +24,8 @@ PREFIX = "freelook:"
 
 
 def recognises(argument: str) -> bool:
-    return (
-        argument.endswith("/") and "://" not in argument
-    )  # a .png is a single picture, unless asked for as snapshot:
+    """A folder; a .png is a single picture, unless it is asked for as snapshot:view.png."""
+    return argument.endswith("/") and "://" not in argument
 
 
 def check(argument: str, settings: SinkSettings) -> None:

@@ -9,13 +9,14 @@ from urllib.parse import urlsplit
 from ..errors import SinkError
 from ..types import Frame, Sink
 from . import SinkSettings, refuse
-from ._child import Child
+from ._child import PROCESSES, Child
 from ._live import LiveEncoder
 
 KIND = "whip"
 
 SCHEMES = ("whip+http://", "whip+https://")
 CONNECT_S = 20.0
+WHIP_CLIENT = f"{PROCESSES}.whip_client"
 
 
 def recognises(argument: str) -> bool:
@@ -54,9 +55,7 @@ class WhipStream:
         self._encoder = LiveEncoder(argument, settings)
         self.counters = self._encoder.counters
         url = argument.removeprefix("whip+")
-        self._child = Child(
-            argument, [sys.executable, "-m", f"{__package__}._whip_client", url], self._heard
-        )
+        self._child = Child(argument, [sys.executable, "-m", WHIP_CLIENT, url], self._heard)
         try:
             self._child.wait_ready(CONNECT_S)
         except SinkError:

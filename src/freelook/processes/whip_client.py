@@ -1,6 +1,6 @@
-"""Publishes the coded pictures from its input (see _child.py) by WHIP (RFC 9725).
+"""Publishes the coded pictures from its input (see sinks/_child.py) by WHIP (RFC 9725).
 
-python -m freelook.sinks._whip_client URL
+python -m freelook.processes.whip_client URL
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from aiortc import (
 from aiortc.mediastreams import MediaStreamError
 from yarl import URL
 
-from ._child import HEADER
+from ..sinks._child import HEADER
 
 CLOCK_HZ = 90_000
 CONNECT_S = 15.0

@@ -1,6 +1,6 @@
-"""Publishes the coded pictures from its input (see _child.py) to an RTSP server.
+"""Publishes the coded pictures from its input (see sinks/_child.py) to an RTSP server.
 
-python -m freelook.sinks._publish URL h264|hevc WIDTH HEIGHT
+python -m freelook.processes.publish URL h264|hevc WIDTH HEIGHT
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from av.container import OutputContainer
 from av.error import FFmpegError
 from av.stream import Stream
 
-from ._child import HEADER
+from ..sinks._child import HEADER
 
 CLOCK_HZ = 90_000
 OPTIONS = {"rtsp_transport": "tcp", "timeout": "5000000"}  # microseconds

@@ -1,6 +1,6 @@
 """Run by the system's Python, whose `gi` has GStreamer: serves one coded stream by RTSP.
 
-    python3 _gst_rtsp_server.py HOST PORT PATH h264|hevc      (pictures: see _child.py)
+    python3 gst_rtsp_server.py HOST PORT PATH h264|hevc      (pictures: see sinks/_child.py)
 
 Needs nothing of freelook.
 """
