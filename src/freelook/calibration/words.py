@@ -122,8 +122,8 @@ def free_form_sentences(calibration: Calibration) -> list[str]:
     if calibration.control:
         across, down = calibration.control
         lines.append(
-            f"{across} x {down} control points; where no corner was seen, they say what "
-            f"{other.model} says there"
+            f"{across} x {down} control points; where no corner was seen, they stay near "
+            f"{other.model}, which is all that their uncertainty says there"
         )
     fitted = f"({free.rms_px:.3f} against {other.rms_px:.3f} px)"
     predicted = f"({free.cross_validated_px:.3f} against {other.cross_validated_px:.3f} px)"

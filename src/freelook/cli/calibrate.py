@@ -73,6 +73,8 @@ def run(args: argparse.Namespace) -> int:
             raise FreelookError(f"{path} exists; --overwrite replaces it")
     if args.control and args.model != "splined_stereographic":
         raise CalibrationError("--control goes with --model splined_stereographic")
+    if args.control and args.live:
+        raise CalibrationError("--control goes with pictures, not with --live")
     target = chosen_target(args)
     return run_live(args, target) if args.live else _run(args, target)
 
