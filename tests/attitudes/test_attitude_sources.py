@@ -79,6 +79,13 @@ def test_csv_lines_that_are_not_numbers_are_counted(tmp_path: Path) -> None:
     assert source.counters.values == {"malformed": 2, "left out": 2}
 
 
+def test_csv_lines_whose_time_is_no_time_are_counted_too(tmp_path: Path) -> None:
+    text = csv_text("t_s,qw,qx,qy,qz", TIMES_US * 1e-6, WXYZ) + "nan,1,0,0,0\n1e300,1,0,0,0\n"
+    source = opened(tmp_path / "a.csv", text)
+    assert largest_error_deg(source) < 1e-6
+    assert source.counters.values == {"malformed": 2}
+
+
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
@@ -218,6 +225,14 @@ def test_gcsv_orientation_can_be_given(tmp_path: Path) -> None:
     source = opened(tmp_path / "a.gcsv", text, "{}?orientation=YxZ")
     yaw = source.track.world_from_body[-1].as_euler("ZYX", degrees=True)[0]
     assert yaw == pytest.approx(np.degrees(0.39), abs=0.1)
+
+
+def test_gcsv_lines_whose_time_is_no_time_are_left_out(tmp_path: Path) -> None:
+    pytest.importorskip("telemetry_parser")
+    times_ms = np.arange(0, 100, 10.0)
+    text = attitude_logs.gcsv(times_ms, np.zeros((10, 3)), np.zeros((10, 3)), "XYZ")
+    source = opened(tmp_path / "a.gcsv", text + "nan,0,0,0,0,0,0\n1e300,0,0,0,0,0,0\n")
+    assert len(source.track.times_ns) == 10
 
 
 @pytest.mark.data

@@ -18,7 +18,7 @@ from types import ModuleType
 
 from ..clock import Clock, now_ns
 from ..errors import AttitudeError
-from ..plugins import modules_by_kind
+from ..plugins import modules_by_kind, split_options
 from ..types import AttitudeSource
 
 
@@ -33,7 +33,7 @@ def open_attitude(spec: str, *, clock: Clock = now_ns) -> AttitudeSource:
     AttitudeError for what no kind recognises, an unknown option (it lists the known ones), and a
     source that cannot be opened.
     """
-    argument, given = _split_options(spec)
+    argument, given = split_options(spec, AttitudeError)
     kinds = known_attitudes()
     prefix, colon, rest = argument.partition(":")
     if colon and prefix in kinds:
@@ -56,18 +56,3 @@ def _recognise(argument: str, kinds: dict[str, ModuleType]) -> ModuleType:
         f"'{argument}' is no attitude that is known by its name; write KIND:{argument}, "
         f"where KIND is one of: {', '.join(kinds)}"
     )
-
-
-def _split_options(spec: str) -> tuple[str, dict[str, str]]:
-    argument, mark, tail = spec.rpartition("?")
-    if not mark:
-        return spec, {}
-    options: dict[str, str] = {}
-    for pair in tail.split("&"):
-        name, equals, value = pair.partition("=")
-        if not equals or not name:
-            raise AttitudeError(f"'{pair}' in '{spec}' is not an option; write name=value")
-        if name in options:
-            raise AttitudeError(f"option '{name}' is given twice in '{spec}'")
-        options[name] = value
-    return argument, options

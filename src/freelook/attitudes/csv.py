@@ -65,8 +65,8 @@ def parse(text: str, name: str) -> LogSource:
     usable = np.abs(seconds) < LONGEST_S
     times_ns = np.round(seconds[usable] * NS_PER_S).astype(np.int64)
     log = _log(name, times_ns, rows[usable], columns)
-    if malformed:
-        log.counters.add("malformed", malformed + int(np.sum(~usable)))
+    if malformed := malformed + int(np.sum(~usable)):
+        log.counters.add("malformed", malformed)
     return log
 
 

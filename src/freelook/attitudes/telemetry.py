@@ -22,6 +22,7 @@ KIND = "telemetry"
 OPTIONS = ("orientation",)
 VIDEOS = (".mp4", ".mov", ".mkv", ".insv", ".360", ".braw", ".r3d", ".mxf")
 LOGS = (".gcsv", ".bbl", ".bfl")
+LARGEST_MS = 5e12
 # forward, right, down from x up, y left, z backward
 FRD_FROM_IMU = np.array([[0.0, 0, -1], [0, -1, 0], [-1, 0, 0]])
 
@@ -43,7 +44,7 @@ def open(argument: str, *, options: Mapping[str, str], clock: Clock) -> LogSourc
         rows = parser.normalized_imu(orientation)
     except Exception as error:  # the parser raises what its Rust code meets
         raise AttitudeError(f"{argument}: no telemetry that can be read ({error})") from None
-    rows = [row for row in rows if row["gyro"] is not None]
+    rows = [row for row in rows if _usable(row)]
     if len(rows) < 2:
         raise AttitudeError(f"{argument}: there is no gyroscope in its telemetry")
     times_ms = np.array([row["timestamp_ms"] for row in rows], float)
@@ -57,6 +58,11 @@ def open(argument: str, *, options: Mapping[str, str], clock: Clock) -> LogSourc
         None if felt is None else felt @ FRD_FROM_IMU.T,
         (f"telemetry of {camera}",),
     )
+
+
+def _usable(row: dict[str, Any]) -> bool:
+    """Whether there are rates, at a time that nanoseconds in 64 bits hold (NaN is none)."""
+    return row["gyro"] is not None and abs(row["timestamp_ms"]) < LARGEST_MS
 
 
 def _accelerations(rows: list[dict[str, Any]]) -> np.ndarray[Any, np.dtype[np.float64]] | None:

@@ -12,8 +12,8 @@ from .history import PoseHistory
 LONGEST_S = 0.2  # further ahead nothing is known, and the head rarely goes on so far
 
 
-class Hold:
-    """The newest pose, whatever the time: no prediction."""
+class _LooksBack:
+    """What both are: a history of poses."""
 
     def __init__(self) -> None:
         self._history = PoseHistory()
@@ -24,27 +24,21 @@ class Hold:
 
     def push(self, pose: Pose) -> None:
         self._history.push(pose)
-
-    def at(self, t_ns: int) -> Rotation:
-        newest = self._history.newest
-        return FRD_FROM_RDF if newest is None else newest.body_from_view
 
     def reset(self) -> None:
         self._history.clear()
 
 
-class ConstantRate:
+class Hold(_LooksBack):
+    """The newest pose, whatever the time: no prediction."""
+
+    def at(self, t_ns: int) -> Rotation:
+        newest = self._history.newest
+        return FRD_FROM_RDF if newest is None else newest.body_from_view
+
+
+class ConstantRate(_LooksBack):
     """Turns on as from the pose before to the newest one, for at most 0.2 seconds."""
-
-    def __init__(self) -> None:
-        self._history = PoseHistory()
-
-    @property
-    def counters(self) -> Counters:
-        return self._history.counters
-
-    def push(self, pose: Pose) -> None:
-        self._history.push(pose)
 
     def at(self, t_ns: int) -> Rotation:
         newest, before = self._history.newest, self._history.before_newest
@@ -56,6 +50,3 @@ class ConstantRate:
         turn = (before.body_from_view.inv() * newest.body_from_view).as_rotvec()
         elapsed_s = (newest.t_ns - before.t_ns) / NS_PER_S
         return newest.body_from_view * Rotation.from_rotvec(turn * (ahead_s / elapsed_s))
-
-    def reset(self) -> None:
-        self._history.clear()

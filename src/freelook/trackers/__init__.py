@@ -19,7 +19,7 @@ from types import ModuleType
 from .. import axes as axes_module
 from ..clock import Clock, now_ns
 from ..errors import TrackerError
-from ..plugins import modules_by_kind
+from ..plugins import modules_by_kind, split_options
 from ..types import Tracker
 
 
@@ -34,7 +34,7 @@ def open_tracker(spec: str, *, clock: Clock = now_ns) -> Tracker:
     TrackerError for an unknown kind or option (it lists the known ones), for text that is not
     understood, and for a tracker that cannot be opened.
     """
-    kind_and_argument, given = _split_options(spec)
+    kind_and_argument, given = split_options(spec, TrackerError)
     kind, _, argument = kind_and_argument.partition(":")
     modules = known_trackers()
     if kind not in modules:
@@ -52,21 +52,6 @@ def open_tracker(spec: str, *, clock: Clock = now_ns) -> Tracker:
     except TrackerError as error:
         raise TrackerError(f"tracker {kind}: {error}") from None
     return tracker
-
-
-def _split_options(spec: str) -> tuple[str, dict[str, str]]:
-    head, mark, tail = spec.rpartition("?")
-    if not mark:
-        return spec, {}
-    options: dict[str, str] = {}
-    for pair in tail.split("&"):
-        name, equals, value = pair.partition("=")
-        if not equals or not name:
-            raise TrackerError(f"'{pair}' in '{spec}' is not an option; write name=value")
-        if name in options:
-            raise TrackerError(f"option '{name}' is given twice in '{spec}'")
-        options[name] = value
-    return head, options
 
 
 def number_option(
