@@ -177,9 +177,11 @@ def test_what_was_right_of_the_middle_is_in_it_after_turning_right(
 ) -> None:
     """And above it, after looking up. The mark is 40 degrees to the right, 20 up."""
     camera = CAMERAS["round"]
-    chosen: Renderer = {"reference": ReferenceRenderer(), "cpu": cpu.CpuRenderer(1), "gl": gl}[
-        renderer
-    ]
+    by_name: dict[str, Renderer] = {
+        "reference": ReferenceRenderer(),
+        "cpu": cpu.CpuRenderer(1),
+        "gl": gl,
+    }
     mark = camera.project(camera.camera_from_body.apply(body_from_view(40, 20).apply([0, 0, 1])))
     y, x = np.mgrid[: camera.size[1], : camera.size[0]]
     luma = np.where(np.hypot(x - mark[0], y - mark[1]) < 12, 255, 0).astype(np.uint8)
@@ -188,7 +190,7 @@ def test_what_was_right_of_the_middle_is_in_it_after_turning_right(
     def found(*head: float) -> NDArray[np.float64]:
         turn = camera.camera_from_body * body_from_view(*head)
         picture = Picture("gray", (luma,), ColorSpace(full_range=True))
-        weight = chosen.render(picture, camera, turn, viewport).planes[0].astype(float)
+        weight = by_name[renderer].render(picture, camera, turn, viewport).planes[0].astype(float)
         rows, columns = np.indices(weight.shape)
         x, y = ((axis * weight).sum() / weight.sum() for axis in (columns, rows))
         return np.array([x, y]) - (np.array(viewport.size) - 1) / 2

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -37,7 +38,7 @@ def blank() -> Picture:
     return Picture("i420", (np.full((height, width), 128, np.uint8), chroma, chroma))
 
 
-def test_coordinates_of_every_projection(open_page) -> None:  # type: ignore[no-untyped-def]
+def test_coordinates_of_every_projection(open_page: Any) -> None:
     """0.01 px, as for perspective views. The rim of a crop is that of the round lens: the offsets
     of this one, 2 px there, may put a pixel on the other side."""
     page = open_page(CAMERA)
@@ -83,11 +84,12 @@ def test_rays_places_and_limits_are_those_of_the_definition(view: PageView) -> N
 
 
 def test_a_key_goes_through_the_projections_each_with_its_own_limits(
-    open_page, page_station
-) -> None:  # type: ignore[no-untyped-def]
+    open_page: Any, page_station: Any
+) -> None:
     camera = make_camera((320, 240), Equidistant(f=70.0), field_deg=220)
     usual, page_station.zoom = page_station.zoom, messages.zoom(camera)
     page = open_page(camera)
+    page_station.zoom = usual  # for the pages of other tests
     page.put(
         Picture("i420", tuple(np.full(s, 128, np.uint8) for s in [(240, 320), *[(120, 160)] * 2]))
     )
@@ -102,10 +104,9 @@ def test_a_key_goes_through_the_projections_each_with_its_own_limits(
         assert page.js("document.getElementById('projection-select').value") == following
     page.until("freelook.app.zoom.projection === 'perspective'")
     assert page.js("freelook.app.zoom.fieldDeg") == pytest.approx(90)  # as it was left
-    page_station.zoom = usual
 
 
-def test_a_strip_fills_the_width_and_no_more_height_than_it_has(open_page) -> None:  # type: ignore[no-untyped-def]
+def test_a_strip_fills_the_width_and_no_more_height_than_it_has(open_page: Any) -> None:
     page = open_page()
     page.js("freelook.app.settings.set('projection', 'strip')")
     page.js("freelook.app.zoom.use('strip')")
