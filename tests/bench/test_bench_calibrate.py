@@ -25,7 +25,7 @@ from freelook.bench.calibration_peers import (
 from freelook.calibration.views import View
 from freelook.camera import Camera, make_camera
 from freelook.cli import main
-from freelook.lens import Equidistant
+from freelook.lens import Equidistant, SplinedStereographic
 
 CAMERA = make_camera((800, 600), Equidistant(260.0), field_deg=120)
 
@@ -97,6 +97,17 @@ def test_ours_is_as_good_as_the_truth(model: str) -> None:
     assert row.rms_px < 0.14
     assert np.isnan(row.cross_validated_px) if model == "auto" else row.cross_validated_px < 0.15
     assert row.seconds > 0
+
+
+def test_a_splined_lens_has_as_many_control_points_as_its_name_says() -> None:
+    """On corners of a round lens: no farther off than the truth, for all that it has to fit with."""
+    way = Ours("splined_stereographic", (7, 6))
+    assert way.name == "freelook, splined, 7 x 6"
+    lens = way.calibrate(small_set().views, (800, 600)).lens
+    assert isinstance(lens, SplinedStereographic)
+    assert (lens.nx, lens.ny) == (7, 6)
+    (row,) = run([small_set()], [way], cross_validate=False)
+    assert row.rms_px < 0.136  # see test_the_truth_is_judged_at_noise_level
 
 
 def test_opencv_solves_what_it_can() -> None:
