@@ -242,6 +242,7 @@ def test_a_view_without_a_head_looks_where_it_is_told() -> None:
         "pitch_deg": "20.0000",
         "roll_deg": "4.0000",
         "hfov_deg": "80",
+        "projection": "perspective",
         "lens": "{}",
         "capture_ns": "12",
     }

@@ -17,7 +17,7 @@ from ..rotations import body_from_view
 from ..session import Session
 from ..types import Frame
 from ..viewport import Viewport
-from ._arguments import size
+from ._arguments import add_projection_argument, size
 from ._cameras import add_lens_arguments, mounted_camera
 from ._circles import camera_by_circle
 from ._progress import say
@@ -35,6 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             f"--{name}", type=float, default=0.0, metavar="DEG", help=f"look this far {to}"
         )
     parser.add_argument("--hfov", type=float, default=90.0, metavar="DEG", help="10-150 (90)")
+    add_projection_argument(parser)
     parser.add_argument(
         "--size", type=size, default=(1280, 720), metavar="WxH", help="of the view (1280x720)"
     )
@@ -50,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
     from ..outputs.group import facts
     from ..sinks import SinkSettings, snapshot
 
-    viewport = Viewport(args.size, args.hfov)
+    viewport = Viewport(args.size, args.hfov, args.projection)
     sink = snapshot.open(args.output, SinkSettings(args.size))
     camera = mounted_camera(args, lambda fov_deg: camera_by_circle(args.source, fov_deg))
     look = body_from_view(args.yaw, args.pitch, args.roll)

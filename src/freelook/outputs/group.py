@@ -188,6 +188,7 @@ def facts(view: View, viewport: Viewport, lens: str) -> dict[str, str]:
         "pitch_deg": f"{pitch:.4f}",
         "roll_deg": f"{roll:.4f}",
         "hfov_deg": f"{viewport.hfov_deg:g}",
+        "projection": viewport.projection,
         "lens": lens,
         "capture_ns": str(view.capture_ns),
     }
