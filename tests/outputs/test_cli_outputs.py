@@ -20,24 +20,49 @@ pytestmark = pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="needs th
 FLY = ("fly", "rtp://127.0.0.1:0", "--lens", "demo")
 
 
+def recorded(folder: Path) -> Path:
+    """A second of grey."""
+    path = folder / "fisheye.mp4"
+    source = ("-f", "lavfi", "-i", "color=0x808080:s=240x240:r=15:d=1", "-pix_fmt", "yuv420p")
+    subprocess.run(["ffmpeg", "-v", "error", *source, "-preset", "ultrafast", path], check=True)
+    return path
+
+
 def test_a_recording_goes_to_several_outputs_until_it_ends(
     tmp_path: Path, wait_until: Callable[..., None]
 ) -> None:
     """Two views of one grey recording: each output has its own size and head."""
-    recording = tmp_path / "fisheye.mp4"
-    picture = "color=0x808080:s=480x480:r=30:d=1000"
-    encoding = ("-pix_fmt", "yuv420p", "-preset", "ultrafast", "-t", "4", str(recording))
-    subprocess.run(["ffmpeg", "-v", "error", "-f", "lavfi", "-i", picture, *encoding], check=True)
     stream, file, shot = tmp_path / "stream.png", tmp_path / "view.mp4", tmp_path / "shot.png"
     address = f"udp://127.0.0.1:{free_port()}"
-    receiving = ("-v", "fatal", "-y", "-i", address, "-frames:v", "2", "-update", "1")
+    receiving = (
+        "-v",
+        "fatal",
+        "-y",
+        "-analyzeduration",
+        "500000",
+        "-i",
+        address,
+        "-frames:v",
+        "2",
+        "-update",
+        "1",
+    )
     receiver = subprocess.Popen(["ffmpeg", *receiving, str(stream)])
     shows = (
         f"stream:{address},size=160x96,head=observer",
         f"file:{file},size=96x64,yaw=20",
         f"snapshot:{shot},size=64x48,every=0.5",
     )
-    command = [sys.executable, "-m", "freelook", "fly", str(recording), "--lens", "demo", "--loop"]
+    command = [
+        sys.executable,
+        "-m",
+        "freelook",
+        "fly",
+        str(recorded(tmp_path)),
+        "--lens",
+        "demo",
+        "--loop",
+    ]
     command += ["--tracker", "observer=wander", "--renderer", "cpu"]
     command += [part for show in shows for part in ("--show", show)]
     flight = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
@@ -92,15 +117,12 @@ def test_mistakes_are_said_before_the_flight(
     assert why in capsys.readouterr().err
 
 
-def test_a_flight_ends_when_nothing_can_be_shown_any_more(tmp_path: Path) -> None:
+def test_a_flight_ends_when_nothing_can_be_shown_any_more(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """The disk is full, and the file was all there was to show."""
-    recording, full = tmp_path / "fisheye.mp4", tmp_path / "view.mp4"
-    picture = "color=0x808080:s=480x480:r=30:d=20"
-    command = ["ffmpeg", "-v", "error", "-f", "lavfi", "-i", picture, "-preset", "ultrafast"]
-    subprocess.run([*command, "-t", "4", str(recording)], check=True)
+    full = tmp_path / "view.mp4"
     full.symlink_to("/dev/full")
-    flying = [sys.executable, "-m", "freelook", "fly", str(recording), "--lens", "demo", "--loop"]
     show = ["--renderer", "cpu", "--show", f"file:{full},size=96x64,overwrite"]
-    flight = subprocess.run([*flying, *show], capture_output=True, text=True, timeout=110)
-    assert flight.returncode == 2
-    assert "No space left on device" in flight.stderr
+    assert main(["fly", str(recorded(tmp_path)), "--lens", "demo", "--loop", *show]) == 2
+    assert "No space left on device" in capsys.readouterr().err
