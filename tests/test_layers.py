@@ -24,7 +24,7 @@ LAYERS: list[set[str]] = [
         "pose_script",
         "attitude",
     }
-    | {"attitude_track", "rate_integration"}
+    | {"attitude_track", "rate_integration", "head_recording"}
     | {"color", "datagrams", "latency", "plugins"},
     {"renderers", "gimbal", "prediction", "simulation", "media", "fitting", "plots", "calibration"}
     | {"alignment", "stabilisation", "resolution", "view_cost", "comparison", "duel"},

@@ -59,10 +59,11 @@ def test_poses_that_repeat_are_left_out_also_with_the_other_sign(tmp_path: Path)
     ("rows", "words"),
     [
         ([], "no poses"),
-        (["0 0 1 0 0"], "line 2: numbers for timestamp viewpoint w x y z"),
+        (["0 0 1 0 0"], "line 2: numbers for timestamp w x y z"),
         (["0 0 1 0 0 0", "1 0 one 0 0 0"], "line 3"),
         (["0 0 1 0 0 nan"], "line 2"),
         (["0 0 2 0 0 0"], "unit length"),
+        (["0 0 1 0 0 0", "1e300 0 1 0 0 0"], "line 3: a time of 1e\\+300 s is none"),
         (["1 0 1 0 0 0", "0.5 0 0.8 0 0 0.6"], "backward at 0.5"),
     ],
 )

@@ -58,7 +58,8 @@ def test_errors_of_a_steady_turn_are_what_they_must_be(steady: Path) -> None:
 def test_lines_that_make_no_sense_are_left_out(steady: Path) -> None:
     text = steady.read_text()
     lines = text.splitlines()
-    bad = ["", "0.5 0 1 0 0", "nan 0 1 0 0 0", "0.6 0 0 0 0 0", "x y z", line(0.01, 90.0)]
+    bad = ["", "0.5 0 1 0 0", "nan 0 1 0 0 0", "0.6 0 0 0 0 0", "x y z", "1e300 0 1 0 0 0"]
+    bad += [line(0.01, 90.0)]
     steady.write_text("\n".join([*lines[:60], *bad, *lines[60:]]))
     assert len(predict.read_recording(steady).t_ns) == 120
 
@@ -68,7 +69,7 @@ def test_lines_that_make_no_sense_are_left_out(steady: Path) -> None:
     [
         ("", "no column timestamp, w, x, y, z"),
         ("timestamp yaw pitch\n0 1 2\n", "no column w, x, y, z"),
-        (HEADER + "\n" + line(0.0, 0.0), "has 1 usable samples"),
+        (HEADER + "\n" + line(0.0, 0.0), " 1 usable samples"),
     ],
 )
 def test_what_is_no_recording_is_said(tmp_path: Path, text: str, why: str) -> None:
@@ -79,10 +80,10 @@ def test_what_is_no_recording_is_said(tmp_path: Path, text: str, why: str) -> No
 
 
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
-    with pytest.raises(TrackerError, match="cannot be read as head motion"):
+    with pytest.raises(TrackerError, match="No such file"):
         predict.read_recording(tmp_path / "none.txt")
     (tmp_path / "bytes").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(TrackerError, match="cannot be read as head motion"):
+    with pytest.raises(TrackerError, match="not a text file"):
         predict.read_recording(tmp_path / "bytes")
 
 
@@ -126,4 +127,4 @@ def test_an_empty_file_is_an_error_of_the_command(
 ) -> None:
     (tmp_path / "empty.txt").write_text("")
     assert main(["bench", "predict", str(tmp_path / "empty.txt")]) != 0
-    assert "has no column timestamp" in capsys.readouterr().err
+    assert "no column timestamp" in capsys.readouterr().err

@@ -19,8 +19,10 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
+from .. import head_recording
 from ..clock import NS_PER_MS, NS_PER_S
 from ..errors import TrackerError
+from ..head_recording import columns_of, read_lines, sample_of
 from ..lens import Floats
 from ..prediction import Predictor, make_predictor
 from ..rotations import angle_between_deg, body_from_view
@@ -29,18 +31,12 @@ from ..types import Pose
 HORIZONS_MS = (20.0, 50.0, 100.0)
 WARM_UP = 30
 PERCENTS = (50, 95, 99)
-COLUMNS = ("timestamp", "w", "x", "y", "z")
-LARGEST_BYTES = 200_000_000
 
 STILL_SECONDS = 11.0
 STILL_RATE_HZ = 60.0
 STILL_NOISE_DEG = 0.02  # per axis, rms: a good inertial tracker at rest
 STEADY_SECONDS = 2.0
 SPEEDS_DEG_S = (1.0, 2.0, 5.0, 10.0, 20.0, 100.0)
-
-# The recordings have x forward and z up, in the world as in the head.
-NED_FROM_UP: Rotation = Rotation.from_matrix([[1, 0, 0], [0, -1, 0], [0, 0, -1]])
-FORWARD_FROM_VIEW: Rotation = Rotation.from_matrix([[0, 0, 1], [-1, 0, 0], [0, -1, 0]])
 
 
 @dataclass(frozen=True)
@@ -64,45 +60,28 @@ class Row:
 
 
 def read_recording(path: Path) -> Recording:
-    """A text file with a line of column names, `timestamp` (s) and `w x y z` among them.
-
-    The quaternion turns head axes (x forward, z up) into those of a world with z up.
+    """A recorded head (`freelook.head_recording`).
 
     Lines whose time does not advance, or that have anything but finite numbers, are left out.
     TrackerError for a file that cannot be read, has other columns, or fewer than 100 such lines.
     """
-    try:
-        if path.stat().st_size > LARGEST_BYTES:
-            raise TrackerError(f"{path} is larger than {LARGEST_BYTES} bytes: no such recording")
-        lines = path.read_text("utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise TrackerError(f"{path} cannot be read as head motion: {error}") from error
-    names = lines[0].replace(",", " ").split() if lines else []
-    if missing := [name for name in COLUMNS if name not in names]:
-        raise TrackerError(
-            f"{path} has no column {', '.join(missing)}; its first line must name the columns "
-            f"timestamp w x y z"
-        )
-    columns = [names.index(name) for name in COLUMNS]
+    lines = read_lines(path)
+    columns = columns_of(path, lines[0] if lines else "")
     rows = [row for line in lines[1:] if (row := _numbers(line, columns))]
     if len(rows) < 100:
-        raise TrackerError(f"{path} has {len(rows)} usable samples; at least 100 are needed")
+        raise TrackerError(f"{path}: {len(rows)} usable samples; at least 100 are needed")
     table = np.array(rows)
     newer = np.concatenate([[True], table[1:, 0] > np.maximum.accumulate(table[:, 0])[:-1]])
     table = table[newer]
     t_ns = np.round((table[:, 0] - table[0, 0]) * NS_PER_S).astype(np.int64)
-    head = Rotation.from_quat(table[:, [2, 3, 4, 1]])
-    return Recording(path.name, t_ns, NED_FROM_UP * head * FORWARD_FROM_VIEW)
+    return Recording(path.name, t_ns, head_recording.body_from_view(table[:, 1:]))
 
 
 def _numbers(line: str, columns: list[int]) -> list[float] | None:
-    words = line.replace(",", " ").split()
     try:
-        row = [float(words[column]) for column in columns]
-    except (ValueError, IndexError):
+        return sample_of(line, columns)
+    except ValueError:
         return None
-    length = np.linalg.norm(row[1:]) if np.isfinite(row).all() else 0.0
-    return row if 0.5 < length < 2.0 and abs(row[0]) < 1e9 else None
 
 
 def errors_deg(

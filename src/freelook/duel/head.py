@@ -12,21 +12,17 @@ from scipy.spatial.transform import Rotation, RotationSpline
 
 from ..clock import NS_PER_S
 from ..errors import TrackerError
+from ..head_recording import body_from_view, columns_of, read_lines, sample_of
 from ..pose_script import read_script
 from ..rotations import FRD_FROM_RDF
 
 Floats = NDArray[np.float64]
 Times = NDArray[np.int64]
 
-COLUMNS = ("timestamp", "w", "x", "y", "z")
 LEAST_STEP_NS = 1_000_000
 SYNTHETIC_SECONDS = 60.0
 TURNS = 12
 TURN_DEG = 60.0
-
-# recordings: x forward, y left, z up, for the head and for the room
-_FRD_FROM_FLU = Rotation.from_quat([1.0, 0.0, 0.0, 0.0])
-_FLU_FROM_RDF = _FRD_FROM_FLU.inv() * FRD_FROM_RDF
 
 
 @dataclass(frozen=True)
@@ -80,56 +76,34 @@ class HeadMotion:
 
 
 def read_head(path: str | Path) -> HeadMotion:
-    """A recording: its first line names the columns, `timestamp` (seconds) and `w x y z` among
-    them, which turn head axes (x forward, z up) into a room's; or a pose script
-    (`freelook.pose_script`).
+    """A recording (`freelook.head_recording`), or a pose script (`freelook.pose_script`).
 
     A sample that repeats the one before it is a pose that came late, not a head that stood still:
     it is left out. TrackerError where the file cannot be read or is wrong; says where.
     """
     path = Path(path)
-    try:
-        lines = path.read_text("utf-8-sig").splitlines()
-    except UnicodeDecodeError:
-        raise TrackerError(f"{path}: not a text file") from None
-    except (OSError, ValueError) as error:
-        raise TrackerError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
+    lines = read_lines(path)
     if lines and lines[0].startswith("t_s,"):
         script = read_script(path)
         return HeadMotion(path.stem, script.times_ns - script.times_ns[0], script.poses)
-    names = _fields(lines[0]) if lines else []
-    if not set(COLUMNS) <= set(names):
-        raise TrackerError(
-            f"{path}: the first line must name the columns {' '.join(COLUMNS)}, or be that of a "
-            "pose script"
-        )
-    times, quaternions = _rows(path, lines[1:], names)
+    times, quaternions = _rows(path, lines)
     return HeadMotion(path.stem, *_cleaned(path, times, quaternions))
 
 
-def _fields(line: str) -> list[str]:
-    return line.replace(",", " ").split()
-
-
-def _rows(path: Path, lines: list[str], names: list[str]) -> tuple[Floats, Floats]:
+def _rows(path: Path, lines: list[str]) -> tuple[Floats, Floats]:
     """Seconds (n,) and w, x, y, z (n, 4)."""
-    places = [names.index(name) for name in COLUMNS]
+    try:
+        columns = columns_of(path, lines[0] if lines else "")
+    except TrackerError as error:
+        raise TrackerError(f"{error}, or be that of a pose script") from None
     rows = []
-    for number, line in enumerate(lines, 2):
+    for number, line in enumerate(lines[1:], 2):
         if not line.strip():
             continue
         try:
-            texts = _fields(line)
-            row = [float(texts[place]) for place in places]
-        except (ValueError, IndexError):
-            row = []
-        if not row or not np.isfinite(row).all():
-            raise TrackerError(
-                f"{path}: line {number}: numbers for {' '.join(names)} are needed: {line!r}"
-            )
-        if not 0.9 < float(np.hypot.reduce(row[1:])) < 1.1:
-            raise TrackerError(f"{path}: line {number}: the quaternion is not of unit length")
-        rows.append(row)
+            rows.append(sample_of(line, columns))
+        except ValueError as error:
+            raise TrackerError(f"{path}: line {number}: {error}") from None
     if not rows:
         raise TrackerError(f"{path}: there are no poses below the header")
     table = np.array(rows)
@@ -145,11 +119,8 @@ def _cleaned(path: Path, times_s: Floats, wxyz: Floats) -> tuple[Times, Rotation
     if (steps < 0).any():
         raise TrackerError(f"{path}: the times run backward at {times_s[fresh][1:][steps < 0][0]}")
     apart = np.concatenate([[True], steps >= LEAST_STEP_NS])
-    w, x, y, z = wxyz[fresh][apart].T
-    world_from_head = Rotation.from_quat(np.stack([x, y, z, w], axis=1))
-    poses = _FRD_FROM_FLU * world_from_head * _FLU_FROM_RDF
     times = times[apart]
-    return times - times[0], poses
+    return times - times[0], body_from_view(wxyz[fresh][apart])
 
 
 def synthetic_head(seconds: float = SYNTHETIC_SECONDS, seed: int = 2011) -> HeadMotion:
