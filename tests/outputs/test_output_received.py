@@ -129,6 +129,36 @@ def test_rtsp_is_pulled(codec: str, transport: str, tmp_path: Path) -> None:
         sink.close()
 
 
+GSTREAMER_PULLS = """
+import sys, gi
+gi.require_version("Gst", "1.0")
+from gi.repository import Gst
+Gst.init(None)
+launch = "rtspsrc location={} latency=0 ! rtph264depay ! fakesink num-buffers=5"
+pulling = Gst.parse_launch(launch.format(sys.argv[1]))
+pulling.set_state(Gst.State.PLAYING)
+ends = Gst.MessageType.EOS | Gst.MessageType.ERROR
+message = pulling.get_bus().timed_pop_filtered(40 * Gst.SECOND, ends)
+pulling.set_state(Gst.State.NULL)
+sys.exit(message is None or message.type != Gst.MessageType.EOS)
+"""
+
+
+@needs_gstreamer
+def test_gstreamer_pulls_rtsp_too() -> None:
+    python = python_with_gstreamer()
+    assert python is not None
+    port = free_port()
+    sink = open_sink(f"rtsp-server://127.0.0.1:{port}/view", size=SIZE, color=ColorSpace("bt601"))
+    puller = subprocess.Popen([python, "-c", GSTREAMER_PULLS, f"rtsp://127.0.0.1:{port}/view"])
+    try:
+        feed_until(sink, puller)
+    finally:
+        puller.kill()
+        puller.wait()
+        sink.close()
+
+
 @needs_gstreamer
 def test_rtsp_port_that_is_taken() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
