@@ -143,7 +143,7 @@ def test_it_starts_as_the_lens_it_is_pulled_to() -> None:
 
 def test_control_points_are_as_many_as_the_points_can_carry() -> None:
     camera = truth("equidistant")
-    made = views_of(camera, 6, 73)
+    made = views_of(camera, 8, 73)
     found = solve(camera, made.poses, made.views, robust=False)
     across, down = usual_control(found, made.views)
     points = sum(len(view.pixels) for view in made.views)

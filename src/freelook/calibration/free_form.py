@@ -34,7 +34,8 @@ from .views import View
 
 FREE_FORM = "splined_stereographic"
 MOST = (16, 12)  # control points, across and down, at most, unless asked for
-COARSE = (10, 8)  # for a first look
+# Fewer can hardly follow a fisheye's difference from a stereographic lens. Also for a first look.
+COARSE = (10, 8)
 POINTS_EACH = 4  # as many points seen for each control point
 FEWEST_CONTROL = ORDER + 2
 WIDEST_DEG = 355
@@ -146,9 +147,10 @@ def check_control(control: Control) -> None:
 
 
 def usual_control(start: Solution, views: Sequence[View]) -> Control:
-    """(across, down): one for four points seen, in the shape of what was seen, 16 x 12 at most."""
-    most = float(np.prod(MOST))
-    number = min(most, sum(int(ok.sum()) for ok in start.inliers) / POINTS_EACH)
+    """(across, down): one for four points seen, in the shape of what was seen, as many as 10 x 8 at
+    least and as 16 x 12 at most."""
+    points = sum(int(ok.sum()) for ok in start.inliers)
+    number = float(np.clip(points / POINTS_EACH, np.prod(COARSE), np.prod(MOST)))
     wide, high = _reach(start, views)
     # (n - 3) cells of one size cover what was seen
     shape = np.sqrt(wide / high)
