@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from freelook.attitude_track import AttitudeTrack
 from freelook.cli import main
-from freelook.cli._recording_time import recording_offset_s
+from freelook.cli._recording_time import recording_offset_s, seconds_or_auto
 from freelook.clock import NS_PER_S
 from freelook.formats import Profile
 from freelook.formats import freelook as profile_format
@@ -146,6 +146,12 @@ def test_what_cannot_be_is_said(
     assert render(folder, shared_data, "no.mp4", *options) == 2
     assert complaint in capsys.readouterr().err
     assert not (folder / "no.mp4").exists()
+
+
+@pytest.mark.parametrize("text", ["nan", "inf", "-1e300"])
+def test_an_offset_that_is_no_time_is_refused(text: str) -> None:
+    with pytest.raises(argparse.ArgumentTypeError, match="not a time in seconds"):
+        seconds_or_auto(text)
 
 
 def test_a_log_that_shows_no_such_motion_is_not_believed(

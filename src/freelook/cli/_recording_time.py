@@ -19,11 +19,17 @@ from ..types import Frame
 LOOK_EVERY_S = 20.0  # of video that has been seen since the last try
 ENOUGH_NS = 500_000.0
 LIKELY, BETTER = 0.8, 0.05  # correlations at which another mounting is worth a word
+MOST_SECONDS = 5e9
 
 
 def seconds_or_auto(text: str) -> float | None:
-    """For argparse: a number of seconds, or None for "auto"."""
-    return None if text == "auto" else float(text)
+    """For argparse: a number of seconds that nanoseconds can hold, or None for "auto"."""
+    if text == "auto":
+        return None
+    value = float(text)
+    if not abs(value) <= MOST_SECONDS:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a time in seconds")
+    return value
 
 
 def recording_offset_s(args: argparse.Namespace, camera: Camera, track: AttitudeTrack) -> float:
