@@ -25,6 +25,7 @@ from freelook.bench.calibration_peers import (
 from freelook.calibration.views import View
 from freelook.camera import Camera, make_camera
 from freelook.cli import main
+from freelook.errors import CalibrationError
 from freelook.lens import Equidistant, SplinedStereographic
 
 CAMERA = make_camera((800, 600), Equidistant(260.0), field_deg=120)
@@ -221,3 +222,10 @@ def test_simulated_sets_are_of_twenty_views_of_fifty_corners() -> None:
     for each in bench.simulated_sets():
         assert len(each.views) == 20
         assert all(40 <= len(view.pixels) <= 50 for view in each.views)
+
+
+def test_a_picture_that_is_none_is_said(tmp_path: Path) -> None:
+    (tmp_path / "fish_1").mkdir()
+    (tmp_path / "fish_1" / "a.jpg").write_bytes(b"no picture")
+    with pytest.raises(CalibrationError, match=r"a\.jpg: not a picture"):
+        bench.real_sets(tmp_path)

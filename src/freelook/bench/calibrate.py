@@ -24,7 +24,7 @@ from ..calibration.initial import pose_of
 from ..calibration.left_out import FOLDS
 from ..calibration.views import Pose, View
 from ..camera import Camera, make_camera
-from ..errors import FreelookError
+from ..errors import CalibrationError, FreelookError
 from ..lens import Equidistant, Equisolid, KannalaBrandt, Lens, Stereographic
 from .boards import Simulated, board, simulate
 from .calibration_peers import PEERS, Peer, PeerFailed
@@ -215,7 +215,10 @@ def _from_pictures(name: str, pictures: Sequence[Path]) -> Set:
 
     target, views, size = Chessboard(0.0325, (6, 8)), [], (0, 0)
     for path in pictures:
-        gray = np.asarray(cv2.imread(str(path), cv2.IMREAD_GRAYSCALE), np.uint8)
+        picture = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+        if picture is None:
+            raise CalibrationError(f"{path}: not a picture that can be read")
+        gray = np.asarray(picture, np.uint8)
         size = (gray.shape[1], gray.shape[0])
         view = target.find(gray, path.name)
         if view is not None:
