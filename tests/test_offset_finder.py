@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from freelook.alignment.image_turns import ImageTurns
 from freelook.alignment.live_offset import LiveOffset
 from freelook.attitude_track import AttitudeTrack
 from freelook.attitudes._pushed import PushedAttitudes
@@ -79,6 +80,24 @@ def test_frames_that_do_not_fit_the_lens_are_told_and_attitudes_go_on(
     wide = Picture("gray", (np.zeros((100, 300), np.uint8),))
     frames.put(Frame(wide, 1))
     wait_until(lambda: "not of the shape" in finder.report)
+    source.push(Attitude(5, Rotation.identity()))
+    wait_until(lambda: vehicle.status().received == 1)
+    vehicle.close()
+
+
+def test_whatever_a_picture_does_the_attitudes_go_on(
+    wait_until: Callable[..., None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def breaks(_turns: ImageTurns, _frame: Frame) -> None:
+        raise RuntimeError("corners out of the picture")
+
+    monkeypatch.setattr(ImageTurns, "push", breaks)
+    source, frames = PushedAttitudes("waiting"), Mailbox[Frame]()
+    finder = OffsetFinder(source, small_fisheye(), frames, lambda _: pytest.fail("no offset"))
+    vehicle = Vehicle(Stabiliser(), finder)
+    vehicle.start()
+    frames.put(Frame(Picture("gray", (np.zeros((100, 100), np.uint8),)), 1))
+    wait_until(lambda: "stopped: RuntimeError: corners out of" in finder.report)
     source.push(Attitude(5, Rotation.identity()))
     wait_until(lambda: vehicle.status().received == 1)
     vehicle.close()

@@ -86,6 +86,8 @@ class OffsetFinder:
                     return
         except FreelookError as error:  # frames that do not fit the lens: they will not later
             self._failure = str(error)
+        except Exception as error:  # whatever a picture does to it, the flight goes on
+            self._failure = f"stopped: {type(error).__name__}: {error}"
 
     def _look(self, frame: Frame) -> None:
         turn = self._turns.push(frame)

@@ -35,7 +35,8 @@ def add_show_argument(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="KIND[:WHERE][,KEY=VALUE...]",
-        help="page (the default; for browsers), window, stream:URL (rtp, udp), file:PATH, "
+        help="page (the default; for browsers), window, stream:URL (rtp, udp, rtsp, "
+        "rtsp-server, whip+http, whip+https), file:PATH, "
         "snapshot:PATH, terminal or virtual-camera; can be given again. Keys: size=1280x720, "
         "hfov=90, projection=NAME, head=NAME (of a tracker), yaw=, pitch=, roll= (a fixed "
         "direction), fps=, bitrate=4M, codec=h264|h265, "
