@@ -237,7 +237,7 @@ class Flown:
 
     camera: Camera | None = None
 
-    def __call__(self, args: Any, ingest: Any, camera: Camera, *rest: Any) -> None:
+    def __call__(self, args: Any, ingest: Any, camera: Camera, *rest: Any, **named: Any) -> None:
         self.camera = camera
 
 
