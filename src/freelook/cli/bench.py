@@ -5,6 +5,7 @@ installed is named as skipped.
 
   freelook bench render                  the two standard cases on all cores
   freelook bench render --threads 1      on one core
+  freelook bench pipeline                whole reframes, beside ffmpeg and OpenCV
   freelook bench latency                 needs a browser; takes about a minute
   freelook bench calibrate --data FOLDER beside OpenCV and mrcal; mrcal takes minutes
   freelook bench calibrate --trials 200  random lenses instead: does it ever fail?
@@ -23,7 +24,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import FreelookError
-from . import _predictions
+from . import _pipelines, _predictions
 
 if TYPE_CHECKING:
     from ..bench.calibrate import Row
@@ -41,6 +42,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     render.add_argument("--large", action="store_true", help="a 4K view out of an 8K picture too")
     render.add_argument("--json", action="store_true", help="print the figures as JSON")
     render.set_defaults(bench=_render)
+    pipeline = what.add_parser("pipeline", help="whole recordings, beside ffmpeg and OpenCV")
+    _pipelines.add_arguments(pipeline)
     latency = what.add_parser("latency", help="stamp to picture, head to changed picture")
     latency.add_argument("--seconds", type=float, default=10.0, metavar="S", help="for each part")
     latency.add_argument("--json", action="store_true", help="print the figures as JSON")

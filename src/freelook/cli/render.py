@@ -74,6 +74,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_mode_arguments(parser)
     add_stabilize_arguments(parser)
     add_renderer_arguments(parser)
+    parser.add_argument(
+        "--preset",
+        metavar="NAME",
+        help="of x264 for a video file, from ultrafast to veryslow: slower makes it smaller at "
+        "the same quality (default: veryfast)",
+    )
     parser.add_argument("--overwrite", action="store_true", help="replace OUT if it exists")
 
 
@@ -128,6 +134,7 @@ def _render_video(
     from ..sources import file
 
     source = file.FileSource(args.input, loop=False, pace=False, clock=lambda: 0)
+    total = source.expected_frames  # asked before a short recording is read to its end
     decoder = Decoder(low_delay=False)
     frames = decoded(source.units(), decoder)
     first = next(frames, None)
@@ -139,7 +146,7 @@ def _render_video(
         camera,
         aim,
         viewport,
-        total=source.expected_frames,
+        total=total,
         color=first.picture.color,
         fps=source.frames_per_s,
         audio_from=args.input,
@@ -174,6 +181,7 @@ def _write(
         color=color,
         overwrite=args.overwrite,
         audio_from=audio_from,
+        preset=args.preset,
     )
     try:
         with bar(args.output, total, "frames", quiet=total == 1) as advance:

@@ -4,7 +4,9 @@ A sink module has a one-line docstring (its row in the documentation), `KIND`, a
 `recognises(argument)` says whether this is one of its own, and `open(argument, settings)` makes
 the sink. Opening checks what can be checked at once, such as a file that is there already. A sink
 that is opened only with the first picture may have `check(argument, settings)` too, and one that
-writes more than pictures `note(facts)`, called before each `write` with where the view looks.
+writes more than pictures `note(facts)`, called before each `write` with where the view looks. One
+that others connect to may have `secured(argument)`, the argument with a password where it needs
+one, and `invitation(argument)`, what to give to those who may come.
 """
 
 from __future__ import annotations
@@ -35,6 +37,7 @@ class SinkSettings:
     sdp          a file to write the description of a live stream to
     bitrate      bits per second of a live stream; None: by the size
     encoder      of a live stream: auto, software or hardware (`freelook.media.encoder`)
+    preset       of x264 or x265 for a video file, such as fast; None: a quick one
     """
 
     size: tuple[int, int]
@@ -46,6 +49,7 @@ class SinkSettings:
     sdp: str | None = None
     bitrate: int | None = None
     encoder: By = "auto"
+    preset: str | None = None
 
 
 def modules() -> dict[str, ModuleType]:
@@ -65,14 +69,19 @@ def open_sink(
     sdp: str | None = None,
     bitrate: int | None = None,
     encoder: By = "auto",
+    preset: str | None = None,
 ) -> Sink:
     """The sink that an argument names: a file, an address, or `KIND:ARGUMENT`.
 
     The settings are those of `SinkSettings`. SinkError when the argument means nothing here or
     the output cannot be opened.
     """
-    settings = SinkSettings(size, fps, color, codec, overwrite, audio_from, sdp, bitrate, encoder)
+    settings = SinkSettings(
+        size, fps, color, codec, overwrite, audio_from, sdp, bitrate, encoder, preset
+    )
     module, argument = find(argument)
+    if module.KIND != "video":
+        refuse(settings, f"{argument}, which is no video file,", "preset")
     sink: Sink = module.open(argument, settings)
     return sink
 

@@ -26,6 +26,8 @@ TICKS_PER_S = 90_000
 KEY_INTERVAL_S = 1.0
 QUALITY = {"h264": "18", "hevc": "20"}  # constant rate factor: hard to tell from the original
 PRESET = {"h264": "veryfast", "hevc": "ultrafast"}
+PRESETS = ("ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower")
+PRESETS += ("veryslow",)
 # Self-contained pieces: whatever was written plays, however the program ended. The header waits
 # for the first piece, so that it can say when the pictures start after the sound.
 FRAGMENTED = {
@@ -190,8 +192,11 @@ def _add_video(container: OutputContainer, settings: SinkSettings) -> VideoStrea
     stream.time_base = stream.codec_context.time_base = Fraction(1, TICKS_PER_S)
     stream.codec_context.gop_size = max(1, round(KEY_INTERVAL_S * settings.fps))
     set_color(stream.codec_context, settings.color)
+    preset = settings.preset or PRESET[codec]
+    if preset not in PRESETS:
+        raise ValueError(f"unknown preset '{preset}'; known: {', '.join(PRESETS)}")
     # no B-frames: they would need a pause before the first picture in a fragmented file
-    stream.options = {"crf": QUALITY[codec], "preset": PRESET[codec], "bf": "0"}
+    stream.options = {"crf": QUALITY[codec], "preset": preset, "bf": "0"}
     if codec == "hevc":
         stream.options |= {"x265-params": "log-level=error"}
         if container.format.name != "matroska":
