@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import sys
 import threading
 from collections.abc import Callable, Iterator
 
@@ -138,3 +139,26 @@ def test_rate_of_nothing_of_one_and_of_a_heap() -> None:
     assert meter.rate_hz(0) == 0
     meter.add(0)
     assert meter.rate_hz(0) == 0
+
+
+def test_rate_is_asked_for_while_times_come_in() -> None:
+    meter, done = RateMeter(), threading.Event()
+    for i in range(2048):
+        meter.add(i)
+
+    def add() -> None:
+        i = 0
+        while not done.is_set():
+            meter.add(i := i + 1)
+
+    before_s = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    adding = threading.Thread(target=add)
+    adding.start()
+    try:
+        for _ in range(300):
+            meter.rate_hz(10)
+    finally:
+        sys.setswitchinterval(before_s)
+        done.set()
+        adding.join()

@@ -25,7 +25,7 @@ LAYERS: list[set[str]] = [
         "attitude",
     }
     | {"attitude_track", "rate_integration", "head_recording"}
-    | {"color", "datagrams", "latency", "plugins"},
+    | {"color", "datagrams", "addresses", "latency", "plugins"},
     {"renderers", "gimbal", "prediction", "simulation", "media", "fitting", "plots", "calibration"}
     | {"alignment", "stabilisation", "resolution", "view_cost", "comparison", "duel"},
     {"sources", "trackers", "attitudes", "sinks", "formats"},

@@ -40,17 +40,20 @@ class HeadStatus:
 
 
 class RateMeter:
-    """How often something happened lately, from the times it was told."""
+    """How often something happened lately, from the times it was told. Safe between threads."""
 
     def __init__(self) -> None:
+        self._lock = threading.Lock()
         self._times_ns: deque[int] = deque(maxlen=2048)
 
     def add(self, t_ns: int) -> None:
-        self._times_ns.append(t_ns)
+        with self._lock:
+            self._times_ns.append(t_ns)
 
     def rate_hz(self, now_ns: int) -> float:
         """Events in the last second, by their spacing; 0 for fewer than two."""
-        recent = [t for t in self._times_ns if now_ns - t <= RATE_WINDOW_S * NS_PER_S]
+        with self._lock:
+            recent = [t for t in self._times_ns if now_ns - t <= RATE_WINDOW_S * NS_PER_S]
         if len(recent) < 2 or recent[-1] <= recent[0]:
             return 0.0
         return (len(recent) - 1) * NS_PER_S / (recent[-1] - recent[0])

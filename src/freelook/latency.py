@@ -42,6 +42,11 @@ def read_stamp(luma: Plane) -> int | None:
         if abs(level - (DARK + BRIGHT) / 2) < (BRIGHT - DARK) / 6:
             return None  # neither dark nor bright: not a stamp, or half of two
         word |= (level > (DARK + BRIGHT) / 2) << bit
+    return time_of(word)
+
+
+def time_of(word: int) -> int | None:
+    """The time in a stamp's 56 bits in nanoseconds; None for damaged ones."""
     time_us = word & ((1 << TIME_BITS) - 1)
     return time_us * NS_PER_US if word >> TIME_BITS == check_bits(time_us) else None
 

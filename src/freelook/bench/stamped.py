@@ -1,10 +1,13 @@
-"""A camera for latency measurements: moving stripes with the time drawn in, as live RTP.
+"""A camera for latency measurements: moving stripes with the time drawn in, as a live stream.
 
-python -m freelook.bench.stamped rtp://127.0.0.1:5004 FILE.sdp SECONDS
+python -m freelook.bench.stamped rtp://127.0.0.1:5004 FILE.sdp SECONDS [WIDTHxHEIGHT]
+
+FILE.sdp is `-` for streams without a description. Says `sending` after the first picture.
 """
 
 from __future__ import annotations
 
+import os
 import sys
 import threading
 
@@ -19,12 +22,12 @@ SIZE = (1280, 720)
 FPS = 30
 
 
-def send(address: str, sdp: str, seconds: float) -> None:
+def send(address: str, sdp: str | None, seconds: float, size: tuple[int, int] = SIZE) -> None:
     """Send at `FPS`; each picture is stamped just before it is encoded."""
-    width, height = SIZE
+    width, height = size
     stripes = (np.add.outer(np.arange(height), np.arange(width * 2)) // 8 % 256).astype(np.uint8)
     grey = np.full((height // 2, width // 2), 128, np.uint8)
-    sink = open_sink(address, size=SIZE, fps=FPS, bitrate=4_000_000, sdp=sdp)
+    sink = open_sink(address, size=size, fps=FPS, bitrate=4_000_000, sdp=sdp)
     start_ns, never = now_ns(), threading.Event()
     for index in range(round(seconds * FPS)):
         never.wait(max(0, start_ns + index * NS_PER_S // FPS - now_ns()) / NS_PER_S)
@@ -32,8 +35,15 @@ def send(address: str, sdp: str, seconds: float) -> None:
         time_ns = now_ns()
         draw_stamp(luma, time_ns)
         sink.write(Frame(Picture("i420", (luma, grey, grey)), time_ns))
+        if index == 0:
+            os.write(1, b"sending\n")
     sink.close()
 
 
+def main(address: str, sdp: str, seconds: str, size: str = "x".join(map(str, SIZE))) -> None:
+    width, height = map(int, size.split("x"))
+    send(address, None if sdp == "-" else sdp, float(seconds), (width, height))
+
+
 if __name__ == "__main__":
-    send(sys.argv[1], sys.argv[2], float(sys.argv[3]))
+    main(*sys.argv[1:])

@@ -36,7 +36,8 @@ def stamped_camera(seconds: float) -> Iterator[tuple[int, Path]]:
     with tempfile.TemporaryDirectory() as folder:
         sdp = Path(folder) / "stamped.sdp"
         command = [sys.executable, "-m", "freelook.bench.stamped", f"rtp://127.0.0.1:{port}"]
-        with subprocess.Popen([*command, str(sdp), str(seconds)]) as camera:
+        quiet = subprocess.DEVNULL
+        with subprocess.Popen([*command, str(sdp), str(seconds)], stdout=quiet) as camera:
             try:
                 _wait_for(sdp, camera)
                 yield port, sdp

@@ -15,7 +15,7 @@ from ..clock import now_ns
 from ..errors import SinkError
 from ..gimbal import Stabiliser
 from ..head import Head
-from ._progress import StatusLine
+from ._progress import StatusLine, say
 from ._renderers import renderer_maker
 from ._signals import asked_to_stop
 from ._stabilising import vehicle_for
@@ -125,7 +125,26 @@ def _outputs(
         soft_limit=args.limit == "soft",
         state=lambda: line.newest,
     )
-    return Outputs(specs, flight)
+    outputs = Outputs(specs, flight)
+    for invitation in outputs.invitations:
+        for url in reachable(invitation):
+            say(f"stream: {url}")
+    return outputs
+
+
+def reachable(url: str) -> list[str]:
+    """Of a server at every address of this machine: one for each, where they can be known."""
+    try:
+        from ..web.security import local_addresses
+    except ImportError:  # of the extra "web", which streams do not need
+        return [url]
+    every = {"0.0.0.0": 4, "[::]": 6}
+    host = next((host for host in every if f"@{host}:" in url), None)
+    if host is None:
+        return [url]
+    found = [a for a in local_addresses() if every[host] == 6 or ":" not in a]
+    shown = [f"[{a}]" if ":" in a else a for a in ["127.0.0.1", *found]]
+    return [url.replace(f"@{host}:", f"@{address}:") for address in shown]
 
 
 def fly_outputs(

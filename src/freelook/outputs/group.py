@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import TracebackType
 
 from ..camera import Camera
@@ -58,11 +58,14 @@ class Outputs:
     """Of a flight; nothing is opened before `start`, but what can be wrong is found here.
 
     SinkError for a head that is not there or an output that cannot be. Use it in `with`.
+    `invitations` are addresses at which viewers find what waits for them, passwords included.
     """
 
     def __init__(self, specs: Sequence[OutputSpec], flight: Flight) -> None:
+        specs = [secured(spec) for spec in specs]
         for spec in specs:
             check(spec, flight)
+        self.invitations = [told for spec in specs if (told := invitation(spec))]
         self.outputs = [make_output(spec, flight) for spec in specs]
         self._clock = flight.clock
 
@@ -131,6 +134,20 @@ def make_output(spec: OutputSpec, flight: Flight) -> Output:
         retry=spec.kind in TRIED_AGAIN,
         describe=lambda view: facts(view, viewport, lens) | {"state": flight.state()},
     )
+
+
+def secured(spec: OutputSpec) -> OutputSpec:
+    """With a password where other machines may come and none was given."""
+    if spec.kind == "stream" and (made := getattr(find(spec.argument)[0], "secured", None)):
+        return replace(spec, argument=made(spec.argument))
+    return spec
+
+
+def invitation(spec: OutputSpec) -> str:
+    """Empty for what nobody comes to."""
+    if spec.kind == "stream" and (made := getattr(find(spec.argument)[0], "invitation", None)):
+        return str(made(spec.argument))
+    return ""
 
 
 def rate_of(spec: OutputSpec) -> float | None:

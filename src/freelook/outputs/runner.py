@@ -49,7 +49,7 @@ class OutputStatus:
         return ", ".join([*parts, *filter(None, [self.message])])
 
 
-WORTH_SAYING = ("dropped", "late", "failures")
+WORTH_SAYING = ("dropped", "late", "unsent", "unread", "refused", "failures")
 
 
 class Output:

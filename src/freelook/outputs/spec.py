@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from ..addresses import without_password
 from ..errors import SinkError
 from ..projections import PROJECTIONS
 from ..sinks import By
@@ -56,8 +57,8 @@ class OutputSpec:
 
     @property
     def name(self) -> str:
-        """For people: the kind, and where it goes."""
-        return f"{self.kind}:{self.argument}" if self.argument else self.kind
+        """For people: the kind, and where it goes, without a password."""
+        return f"{self.kind}:{without_password(self.argument)}" if self.argument else self.kind
 
 
 def parse(text: str) -> OutputSpec:

@@ -46,11 +46,13 @@ class Pictures(MediaStreamTrack):
         if self._waiting.qsize() >= MOST_WAITING:
             while not self._waiting.empty():
                 self._waiting.get_nowait()
+                tell("unread")
             self._need_key = True
         if key or not self._need_key:
             self._need_key = False
             self._waiting.put_nowait((t_ns, data))
-        elif self._need_key:
+        else:
+            tell("unread")
             tell("key")
 
     def end(self) -> None:

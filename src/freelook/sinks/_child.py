@@ -16,7 +16,7 @@ import subprocess
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from ..errors import SinkError
 from ..types import AccessUnit
@@ -31,10 +31,15 @@ LAST_LINES = 4
 
 class Child:
     """Started at once; `wait_ready` before the first `send`. SinkError, with the program's last
-    words, when it ended or takes nothing any more."""
+    words, when it ended or takes nothing any more. `secrets` go by the environment, which other
+    users of the machine cannot see, as they do a command."""
 
     def __init__(
-        self, argument: str, command: Sequence[str], heard: Callable[[str], None] = lambda _: None
+        self,
+        argument: str,
+        command: Sequence[str],
+        heard: Callable[[str], None] = lambda _: None,
+        secrets: Mapping[str, str] | None = None,
     ) -> None:
         self._argument = argument
         self._heard = heard
@@ -44,7 +49,12 @@ class Child:
         pipe = subprocess.PIPE
         try:
             self._process = subprocess.Popen(
-                command, stdin=pipe, stdout=pipe, stderr=pipe, start_new_session=True
+                command,
+                stdin=pipe,
+                stdout=pipe,
+                stderr=pipe,
+                start_new_session=True,
+                env={**os.environ, **(secrets or {})},
             )
         except OSError as error:
             raise SinkError(f"{argument}: {command[0]}: {error.strerror}") from None

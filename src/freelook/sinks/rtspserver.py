@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import secrets
 import subprocess
 import sys
 from functools import cache
 from pathlib import Path
-from urllib.parse import urlsplit
+from urllib.parse import unquote, urlsplit
 
+from ..addresses import is_loopback, without_password
 from ..errors import SinkError
 from ..types import Frame, Sink
 from . import SinkSettings, refuse
@@ -30,6 +32,8 @@ PACKAGES = (
     "python3-gi gir1.2-gst-rtsp-server-1.0 gstreamer1.0-plugins-base gstreamer1.0-plugins-good"
 )
 DEFAULT_PATH = "/view"
+USER, PASSWORD = "FREELOOK_RTSP_USER", "FREELOOK_RTSP_PASSWORD"  # as the helper reads them
+MADE_UP_USER = "pilot"
 
 
 def recognises(argument: str) -> bool:
@@ -38,8 +42,24 @@ def recognises(argument: str) -> bool:
 
 def check(argument: str, settings: SinkSettings) -> None:
     refuse(settings, "RTSP, which has its own way to describe itself,", "sdp")
-    host_and_port(argument)
+    _who_may(argument)
     _needed_python(argument)
+
+
+def secured(argument: str) -> str:
+    """With a password made up, where other machines reach the server and none was given."""
+    host, _ = host_and_port(argument)
+    if _given(argument) or is_loopback(host):
+        return argument
+    who = f"{MADE_UP_USER}:{secrets.token_urlsafe(12)}"
+    return argument.replace("://", f"://{who}@", 1)
+
+
+def invitation(argument: str) -> str:
+    """What players are given: the address, password included."""
+    url = urlsplit(argument)
+    path = url.path.rstrip("/") or DEFAULT_PATH
+    return f"rtsp://{url.netloc}{path}"
 
 
 def open(argument: str, settings: SinkSettings) -> Sink:
@@ -52,18 +72,22 @@ class RtspServer:
     it to whoever asks, by UDP or TCP. A viewer who comes gets a key picture at once; one who stalls
     loses his own pictures only.
 
-    The server listens where the address says: at 127.0.0.1 for this machine only. Counters: sent
-    (pictures), keys_asked, clients (that came).
+    The server listens where the address says: at 127.0.0.1 for this machine only; anywhere else
+    viewers need the user and password in the address (SinkError without). Counters: sent
+    (pictures), keys_asked, clients (that came), refused (of them), unread (pictures thrown away as
+    their viewer was behind).
     """
 
     def __init__(self, argument: str, settings: SinkSettings) -> None:
+        who, address = _who_may(argument), argument
+        argument = without_password(argument)
         self._encoder = LiveEncoder(argument, settings)
         self.counters = self._encoder.counters
         self.clients = 0
-        host, port = host_and_port(argument)
-        path = urlsplit(argument).path.rstrip("/") or DEFAULT_PATH
+        host, port = host_and_port(address)
+        path = urlsplit(address).path.rstrip("/") or DEFAULT_PATH
         command = [_needed_python(argument), str(HELPER), host, str(port), path]
-        self._child = Child(argument, [*command, self._encoder.codec], self._heard)
+        self._child = Child(argument, [*command, self._encoder.codec], self._heard, who)
         try:
             self._child.wait_ready()
         except SinkError:
@@ -90,6 +114,8 @@ class RtspServer:
         elif what == "clients" and number.isdigit():
             self.counters.add("clients", max(0, int(number) - self.clients))
             self.clients = int(number)
+        elif what in ("refused", "unread"):
+            self.counters.add(what)
 
 
 @cache
@@ -103,6 +129,26 @@ def python_with_gstreamer() -> str | None:
         if run.returncode == 0:
             return python
     return None
+
+
+def _given(argument: str) -> bool:
+    url = urlsplit(argument)
+    return bool(url.username and url.password)
+
+
+def _who_may(argument: str) -> dict[str, str]:
+    """User and password for the helper's environment; none where only this machine comes."""
+    host, _ = host_and_port(argument)
+    url = urlsplit(argument)
+    if url.username and url.password:
+        return {USER: unquote(url.username), PASSWORD: unquote(url.password)}
+    if url.username or url.password or not is_loopback(host):
+        address = without_password(argument)
+        raise SinkError(
+            f"{address}: give user and password, as other machines can come: "
+            f"{address.replace('://', '://USER:PASSWORD@', 1)}"
+        )
+    return {}
 
 
 def _needed_python(argument: str) -> str:

@@ -48,7 +48,8 @@ def open(argument: str, settings: SinkSettings) -> Sink:
 class WhipStream:
     """Encodes each frame with the least delay; aiortc, in a process of its own, sends it.
 
-    A server that lost a picture gets a key picture. Counters: sent (pictures), keys_asked.
+    A server that lost a picture gets a key picture. Counters: sent (pictures), keys_asked, unread
+    (pictures thrown away as the network was behind).
     """
 
     def __init__(self, argument: str, settings: SinkSettings) -> None:
@@ -72,3 +73,5 @@ class WhipStream:
     def _heard(self, words: str) -> None:
         if words == "key":
             self._encoder.want_key()
+        elif words == "unread":
+            self.counters.add("unread")

@@ -23,6 +23,8 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
+from ..addresses import is_address as is_address
+from ..addresses import is_loopback as is_loopback
 from ..errors import FreelookError
 
 # Browsers refuse certificates that are valid for longer than 398 days.
@@ -56,13 +58,6 @@ class Guard:
 
 def make_token() -> str:
     return secrets.token_urlsafe(16)
-
-
-def is_loopback(host: str) -> bool:
-    """Whether only this machine reaches a server listening on `host`."""
-    if host.lower() == "localhost":
-        return True
-    return is_address(host) and ipaddress.ip_address(host).is_loopback
 
 
 def local_addresses() -> list[str]:
@@ -165,11 +160,3 @@ def _host_name(host: str) -> str:
         return urlsplit(f"//{host}").hostname or ""
     except ValueError:
         return ""
-
-
-def is_address(name: str) -> bool:
-    try:
-        ipaddress.ip_address(name)
-    except ValueError:
-        return False
-    return True
