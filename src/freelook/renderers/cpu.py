@@ -10,6 +10,7 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
+from itertools import pairwise
 from typing import Any
 
 import cv2
@@ -24,8 +25,7 @@ from . import kernels
 from .blank import Sampling, black_of, check_fits, plane_scales
 from .window import rim_px, window_of
 
-# measured; multiples of the node spacings, so that no node is computed twice
-BAND_ROWS = (128, 144, 112, 96)
+BAND_ROWS = 112  # about; measured
 
 ROUND = np.empty((0, 0, 2), np.float32)  # the offset grid of a round lens
 
@@ -179,10 +179,15 @@ def _window_filler(camera: Camera, viewport: Viewport) -> _Filler:
 
 @lru_cache
 def _bands(height: int, threads: int) -> list[tuple[int, int]]:
-    """(first row, rows) of the bands of a view: the same number for every thread, if possible."""
-    fair = (rows for rows in BAND_ROWS if -(-height // rows) % threads == 0)
-    rows = next(fair, BAND_ROWS[0])
-    return [(row, min(rows, height - row)) for row in range(0, height, rows)]
+    """(first row, rows) of the bands of a view: as many for every thread, nearly equally large.
+
+    Only the last may break off between nodes, so that no node is computed twice.
+    """
+    each = max(1, round(height / BAND_ROWS / threads))
+    cells = -(-height // kernels.COARSEST)
+    count = min(each * threads, cells)
+    edges = [kernels.COARSEST * (cells * i // count) for i in range(count)]
+    return [(row, after - row) for row, after in pairwise([*edges, height])]
 
 
 def _sample(plane: Plane, maps: FloatMap, flags: int, black: int, out: Plane) -> None:

@@ -15,6 +15,7 @@ FAR = np.float32(4.0)  # rays are followed to this many times t_max, then held: 
 
 TOLERANCE_PX = np.float32(0.005)
 COARSEST, FINEST = 16, 2  # view pixels between nodes
+PIECE = 512  # view pixels
 RIM = np.float32(0.98)  # of t_max: below it, no pixel of the view is feathered
 
 PERSPECTIVE, PANNINI, STEREOGRAPHIC, CYLINDRICAL, EQUIRECTANGULAR = (
@@ -85,30 +86,46 @@ def project_nodes(
     Node (j, i) stands at view pixel x = step * (i - 1), y = first_row + step * (j - 1): one
     ring of nodes more than the band, for cubic interpolation.
     """
+    place_on_plane(nodes, first_row, step, size, focal_px, formula, camera_from_view)
+    stretch_by_table(nodes, g, t_max)
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def place_on_plane(
+    nodes: F32,
+    first_row: int,
+    step: int,
+    size: tuple[int, int],
+    focal_px: float,
+    formula: int,
+    camera_from_view: F32,
+) -> None:
+    """Fill nodes with the stereographic plane's p, and t = |p|^2, of the rays through them."""
     f32 = np.float32
-    cx, cy, focal = f32((size[0] - 1) / 2), f32((size[1] - 1) / 2), f32(focal_px)
+    per_px = f32(1) / f32(focal_px)
+    left = f32(-step - (size[0] - 1) / 2) * per_px
     r = camera_from_view
-    per_place = f32(len(g) - 1) / (np.sqrt(t_max) + t_max)
-    far = FAR * t_max
     for row in range(nodes.shape[1]):
-        y = (f32(first_row + (row - 1) * step) - cy) / focal
+        y = f32(first_row + (row - 1) * step - (size[1] - 1) / 2) * per_px
         if formula == PERSPECTIVE:  # a loop of its own, as fast as it can be
             for column in range(nodes.shape[2]):
-                x = (f32((column - 1) * step) - cx) / focal
+                x = left + f32(np.int32(column)) * f32(step) * per_px
                 dx = r[0, 0] * x + r[0, 1] * y + r[0, 2]
                 dy = r[1, 0] * x + r[1, 1] * y + r[1, 2]
                 dz = r[2, 0] * x + r[2, 1] * y + r[2, 2]
-                u, v, t = round_image(dx, dy, dz, g, per_place, far)
-                nodes[0, row, column], nodes[1, row, column], nodes[2, row, column] = u, v, t
+                px, py = on_plane(dx, dy, dz)
+                nodes[0, row, column], nodes[1, row, column] = px, py
+                nodes[2, row, column] = px * px + py * py
         else:
             for column in range(nodes.shape[2]):
-                x = (f32((column - 1) * step) - cx) / focal
+                x = left + f32(np.int32(column)) * f32(step) * per_px
                 rx, ry, rz = view_ray(formula, x, y)
                 dx = r[0, 0] * rx + r[0, 1] * ry + r[0, 2] * rz
                 dy = r[1, 0] * rx + r[1, 1] * ry + r[1, 2] * rz
                 dz = r[2, 0] * rx + r[2, 1] * ry + r[2, 2] * rz
-                u, v, t = round_image(dx, dy, dz, g, per_place, far)
-                nodes[0, row, column], nodes[1, row, column], nodes[2, row, column] = u, v, t
+                px, py = on_plane(dx, dy, dz)
+                nodes[0, row, column], nodes[1, row, column] = px, py
+                nodes[2, row, column] = px * px + py * py
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
@@ -125,20 +142,29 @@ def view_ray(formula: int, x: Any, y: Any) -> tuple[Any, Any, Any]:
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True, inline="always")
-def round_image(
-    dx: Any, dy: Any, dz: Any, g: F32, per_place: Any, far: Any
-) -> tuple[Any, Any, Any]:
-    """x and y in the round image, from the axis, and t, of a ray in the camera frame."""
-    f32 = np.float32
+def on_plane(dx: Any, dy: Any, dz: Any) -> tuple[Any, Any]:
+    """p of a ray in the camera frame: (dx, dy) over the length plus dz."""
     length = np.sqrt(dx * dx + dy * dy + dz * dz)
-    inverse = f32(1) / max(length + dz, f32(1e-6) * length)
-    px, py = dx * inverse, dy * inverse
-    t = px * px + py * py
-    if t > far:
-        shrink = np.sqrt(far / t)
-        px, py, t = px * shrink, py * shrink, far
-    gain = look_up(g, (np.sqrt(t) + t) * per_place)
-    return px * gain, py * gain, t
+    inverse = np.float32(1) / max(length + dz, np.float32(1e-6) * length)
+    return dx * inverse, dy * inverse
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def stretch_by_table(nodes: F32, g: F32, t_max: float) -> None:
+    """From p to the round image, x and y times the table's gain, in place.
+
+    Rays beyond FAR times t_max are held there. A pass of its own: that it can be vectorised is
+    half its speed.
+    """
+    far = FAR * t_max
+    per_place = np.float32(len(g) - 1) / (np.sqrt(t_max) + t_max)
+    for row in range(nodes.shape[1]):
+        u, v, t = nodes[0, row], nodes[1, row], nodes[2, row]
+        for i in range(len(t)):
+            held = min(t[i], far)
+            gain = look_up(g, (np.sqrt(held) + held) * per_place)
+            gain *= np.sqrt(held / max(t[i], np.float32(1e-30)))
+            u[i], v[i], t[i] = u[i] * gain, v[i] * gain, held
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
@@ -180,15 +206,17 @@ def place_nodes(nodes: F32, center: F32, stretch: F32) -> None:
 def look_up(g: F32, at: Any) -> Any:
     """The table at a fractional index; beyond its end it goes on as a parabola.
 
-    Out there all is black, but a kink would spoil the interpolation next to the rim.
+    Out there all is black, but a kink would spoil the interpolation next to the rim. Without
+    branches, for the sake of loops around it.
     """
     last = len(g) - 1
-    if at < last:
-        entry = int(at)
-        return g[entry] + (g[entry + 1] - g[entry]) * (at - entry)
-    bend = g[last] - 2 * g[last - 1] + g[last - 2]
-    beyond = at - last
-    return g[last] + beyond * (g[last] - g[last - 1] + bend / 2 + bend * beyond / 2)
+    inside = min(at, np.float32(last))
+    entry = min(np.int32(inside), np.int32(last - 1))
+    low, high = g[np.uintp(entry)], g[np.uintp(entry) + np.uintp(1)]
+    bend = (g[last] - np.float32(2) * g[last - 1] + g[last - 2]) * np.float32(0.5)
+    beyond = at - inside
+    past = beyond * (g[last] - g[last - 1] + bend + bend * beyond)
+    return low + (high - low) * (inside - np.float32(entry)) + past
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
@@ -199,20 +227,31 @@ def interpolation_error(nodes: F32, t_max: float) -> float:
     3/128 of its fourth difference; both directions add up. On the border it is that of the
     nearest node that has one.
     """
-    worst = np.float32(0.0)
-    for row in range(1, nodes.shape[1] - 1):
-        j = min(max(row, 2), nodes.shape[1] - 3)
-        for column in range(1, nodes.shape[2] - 1):
-            if nodes[2, row, column] <= t_max:
-                i = min(max(column, 2), nodes.shape[2] - 3)
-                for k in range(2):
-                    n = nodes[k]
-                    across = n[row, i - 2] - 4 * n[row, i - 1] + 6 * n[row, i]
-                    across += n[row, i + 2] - 4 * n[row, i + 1]
-                    down = n[j - 2, column] - 4 * n[j - 1, column] + 6 * n[j, column]
-                    down += n[j + 2, column] - 4 * n[j + 1, column]
-                    worst = max(worst, abs(across) + abs(down))
+    rows, columns = nodes.shape[1:]
+    last = columns - 3  # that has a fourth difference along the row
+    worst = np.float32(0)
+    for k in range(2):
+        for row in range(1, rows - 1):
+            seen = nodes[2, row]
+            j = min(max(row, 2), rows - 3)
+            for i in range(2, last + 1):
+                strays = fourth_differences(nodes[k], row, j, i, i)
+                worst = max(worst, strays if seen[i] <= t_max else np.float32(0))
+            for i, border in ((2, 1), (last, last + 1)):
+                strays = fourth_differences(nodes[k], row, j, i, border)
+                worst = max(worst, strays if seen[border] <= t_max else np.float32(0))
     return float(worst) * 3 / 128
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True, inline="always")
+def fourth_differences(n: F32, row: Any, j: Any, i: Any, column: Any) -> Any:
+    """Their sizes along a row around column i, and down a column around row j, added up."""
+    four, six = np.float32(4), np.float32(6)
+    across = n[row, i - 2] + n[row, i + 2] + six * n[row, i]
+    across -= four * (n[row, i - 1] + n[row, i + 1])
+    down = n[j - 2, column] + n[j + 2, column] + six * n[j, column]
+    down -= four * (n[j - 1, column] + n[j + 1, column])
+    return abs(across) + abs(down)
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
@@ -236,15 +275,16 @@ def expand(nodes: F32, step: int, values: int, luma: F32, chroma: F32) -> None:
 @numba.njit(cache=True, nogil=True, fastmath=True)
 def widen(nodes: F32, step: int, out: F32) -> None:
     """Expand one row of nodes along the row, by the cubic through four of them (Lagrange)."""
+    per_step = np.float32(1) / np.float32(step)
     for cell in range((len(out) - 1) // step + 1):
         a, b, c, d = nodes[cell], nodes[cell + 1], nodes[cell + 2], nodes[cell + 3]
         c3 = (d - a) / np.float32(6) + (b - c) / np.float32(2)
         c2 = (a + c) / np.float32(2) - b
         c1 = c - b - c2 - c3
-        start = cell * step
-        for k in range(min(step, len(out) - start)):
-            f = np.float32(k) / np.float32(step)
-            out[start + k] = ((c3 * f + c2) * f + c1) * f + b
+        between = out[cell * step : (cell + 1) * step]
+        for k in range(len(between)):
+            f = np.float32(np.int32(k)) * per_step
+            between[k] = ((c3 * f + c2) * f + c1) * f + b
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
@@ -263,23 +303,31 @@ def halve(wide: F32, coordinates: bool, out: F32) -> None:
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
 def blend_rows(wide: F32, per_cell: int, shift: Any, out: F32) -> None:
-    """Rows between widened rows, by the cubic through four of them (Lagrange)."""
+    """Rows between widened rows, by the cubic through four of them (Lagrange).
+
+    In pieces so short that the four stay in the nearest cache for all rows between them.
+    """
+    for cell in range((out.shape[0] - 1) // per_cell + 1):
+        rows = out[cell * per_cell : (cell + 1) * per_cell]
+        for start in range(0, out.shape[1], PIECE):
+            piece = slice(start, start + PIECE)
+            a, b = wide[cell, piece], wide[cell + 1, piece]
+            c, d = wide[cell + 2, piece], wide[cell + 3, piece]
+            for row in range(len(rows)):
+                f = np.float32(row) / np.float32(per_cell) + shift
+                blend(a, b, c, d, f, rows[row, piece])
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def blend(a: F32, b: F32, c: F32, d: F32, f: Any, out: F32) -> None:
+    """The cubic through a, b, c, d at -1, 0, 1, 2, at f."""
     one, two, six = np.float32(1), np.float32(2), np.float32(6)
-    for row in range(out.shape[0]):
-        cell, within = divmod(row, per_cell)
-        f = np.float32(within) / np.float32(per_cell) + shift
-        wa = -f * (f - one) * (f - two) / six
-        wb = (f + one) * (f - one) * (f - two) / two
-        wc = -(f + one) * f * (f - two) / two
-        wd = (f + one) * f * (f - one) / six
-        target = out[row]
-        for i in range(out.shape[1]):
-            target[i] = (
-                wa * wide[cell, i]
-                + wb * wide[cell + 1, i]
-                + wc * wide[cell + 2, i]
-                + wd * wide[cell + 3, i]
-            )
+    wa = -f * (f - one) * (f - two) / six
+    wb = (f + one) * (f - one) * (f - two) / two
+    wc = -(f + one) * f * (f - two) / two
+    wd = (f + one) * f * (f - one) / six
+    for i in range(len(out)):
+        out[i] = wa * a[i] + wb * b[i] + wc * c[i] + wd * d[i]
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
