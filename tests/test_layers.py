@@ -27,6 +27,7 @@ LAYERS: list[set[str]] = [
     | {"attitude_track", "rate_integration", "head_recording"}
     | {"color", "datagrams", "addresses", "latency", "plugins"},
     {"renderers", "gimbal", "prediction", "simulation", "media", "fitting", "plots", "calibration"}
+    | {"hud"}
     | {"alignment", "stabilisation", "resolution", "view_cost", "comparison", "duel"},
     {"sources", "trackers", "attitudes", "sinks", "formats"},
     {"ingest", "head", "vehicle", "offset_finder", "session", "offline"},

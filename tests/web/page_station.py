@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from freelook.camera import Camera
 from freelook.types import Picture
 from freelook.web.messages import camera_table
-from freelook.web.server import HEADERS
+from freelook.web.server import HEADERS, SHARED
 
 PACKAGE = Path(__file__).resolve().parents[2] / "src" / "freelook"
 
@@ -63,7 +63,8 @@ class PageStation:
     async def _start(self) -> web.AppRunner:
         app = web.Application(middlewares=[self._noted])
         app.router.add_get("/", self._index)
-        app.router.add_get("/view.glsl", self._shader)
+        for address in SHARED:
+            app.router.add_get(address, self._shared)
         app.router.add_get("/api/station", self._about)
         app.router.add_post("/api/control", self._control)
         app.router.add_post("/api/mode", self._control)
@@ -87,8 +88,8 @@ class PageStation:
     async def _index(self, request: web.Request) -> web.StreamResponse:
         return web.FileResponse(PACKAGE / "web" / "static" / "index.html")
 
-    async def _shader(self, request: web.Request) -> web.StreamResponse:
-        return web.Response(text=(PACKAGE / "renderers" / "view.glsl").read_text("utf-8"))
+    async def _shared(self, request: web.Request) -> web.StreamResponse:
+        return web.Response(text=SHARED[request.path].read_text("utf-8"))
 
     async def _about(self, request: web.Request) -> web.StreamResponse:
         if self.token and request.headers.get("Authorization") != f"Bearer {self.token}":

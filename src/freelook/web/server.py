@@ -15,7 +15,12 @@ from .station import ACTIONS, Station, UnknownName
 from .whep import Refused
 
 STATIC = Path(__file__).parent / "static"
-SHADER = Path(__file__).parent.parent / "renderers" / "view.glsl"
+PACKAGE = Path(__file__).parent.parent
+SHARED = {  # what the page and this side read alike, by address
+    "/view.glsl": PACKAGE / "renderers" / "view.glsl",
+    "/pen.glsl": PACKAGE / "hud" / "pen.glsl",
+    "/hud.json": PACKAGE / "hud" / "hud.json",
+}
 LARGEST_BODY = 64 * 1024
 LONGEST_BODY_S = 10.0
 RETRY_AFTER_S = "5"
@@ -54,7 +59,8 @@ def guarded_app(guard: Guard, page: str) -> web.Application:
     app[GUARD] = guard
     app[PAGE] = page
     app.router.add_get("/", _index)
-    app.router.add_get("/view.glsl", _shader)
+    for address in SHARED:
+        app.router.add_get(address, _shared)
     if STATIC.is_dir():
         app.router.add_static("/static/", STATIC)
     return app
@@ -105,7 +111,7 @@ async def _guarded(request: web.Request, handler: Handler) -> web.StreamResponse
 
 def _is_public(path: str) -> bool:
     """Files of the package: no secret, and browsers load them without our headers."""
-    return path.startswith("/static/") or path == "/view.glsl"
+    return path.startswith("/static/") or path in SHARED
 
 
 def _bearer(request: web.Request) -> str:
@@ -124,8 +130,8 @@ async def _index(request: web.Request) -> web.StreamResponse:
     )
 
 
-async def _shader(request: web.Request) -> web.StreamResponse:
-    return web.Response(text=SHADER.read_text("utf-8"))
+async def _shared(request: web.Request) -> web.StreamResponse:
+    return web.Response(text=SHARED[request.path].read_text("utf-8"))
 
 
 async def _about(request: web.Request) -> web.StreamResponse:

@@ -33,16 +33,21 @@ const TICK_MS = 250;
 const byId = (/** @type {string} */ id) => /** @type {any} */ (document.getElementById(id));
 
 export class App {
-  /** @param {import('./station.js').Station} station @param {string} shaderBody */
-  constructor(station, shaderBody) {
+  /** @param {import('./station.js').Station} station @param {string} shaderBody
+   * @param {import('./station.js').Hud} hud */
+  constructor(station, shaderBody, hud) {
     this.station = station;
+    this.hud = hud.known;
     this.notify = notify;
     this.wake = this.wake.bind(this);
-    this.settings = new Settings({ limit: station.limit, projection: station.projection ?? 'perspective' });
+    this.settings = new Settings({
+      limit: station.limit, projection: station.projection ?? 'perspective',
+      ...(station.hud === 'off' ? { instruments: false } : { hud: station.hud ?? 'day' }),
+    });
     this.zoom = new Zoom(station.hfov_deg, station.zoom);
-    this.renderer = new Renderer(byId('view'), shaderBody, new Camera(station.camera));
+    this.renderer = new Renderer(byId('view'), shaderBody, new Camera(station.camera), hud);
     this.limit = new LensLimit(this.renderer.profile, station.rate_deg_s);
-    this.screen = new Screen(byId('stage'), this.renderer, this.settings, this.zoom);
+    this.screen = new Screen(byId('stage'), this.renderer, this.settings, this.zoom, hud.known);
     document.documentElement.classList.toggle('software', this.renderer.software);
 
     // Before there is a picture, poses are not worth the work of drawing.
@@ -88,7 +93,7 @@ export class App {
     this.gamepads = new Gamepads({ command, zoom, settings, wake });
     bindButtons(actions, wake);
     makeHeadButtons(this);
-    fillPanel(byId('settings-form'), settings, station.modes, (mode) => this.setMode(mode));
+    fillPanel(byId('settings-form'), settings, station.modes, this.hud, (mode) => this.setMode(mode));
     this.start();
   }
 
@@ -142,6 +147,7 @@ export class App {
 
   /** Heads turn in the base of the frame that is shown. */
   takeBase() {
+    this.screen.world = this.link.worldOf(this.shownRtp);
     const base = this.link.baseOf(this.shownRtp);
     if (!base || base.join() === this.command.base.join()) return;
     this.command.base = base;
@@ -169,7 +175,10 @@ export class App {
    * @param {number} nowMs @returns {import('./hand.js').Aim} */
   aim(nowMs) {
     const aim = this.command.aim(nowMs);
-    if (this.settings.get('limit') !== 'soft') return aim;
+    if (this.settings.get('limit') !== 'soft') {
+      this.limit.holding = 0;
+      return aim;
+    }
     const view = this.screen.viewOn(this.screen.panes().main);
     return { ...aim, q: this.limit.apply(aim.q, view, nowMs) };
   }

@@ -30,6 +30,8 @@ export function actionsOf(app) {
     split: () => settings.set('split', (settings.get('split') + 1) % SPLITS.length),
     full: toggleFullScreen,
     instruments: () => settings.set('instruments', !settings.get('instruments')),
+    theme: () => nextTheme(app),
+    panels: () => settings.set('panels', !settings.get('panels')),
     settings: () => togglePanel('settings'),
     help: () => togglePanel('help'),
     close: () => togglePanel('', false),
@@ -46,10 +48,20 @@ function nextProjection(app) {
   app.notify(`Projection: ${next}`);
 }
 
+/** @param {App} app */
+function nextTheme(app) {
+  const names = Object.keys(app.hud.themes);
+  const next = names[(names.indexOf(app.settings.get('hud')) + 1) % names.length];
+  app.settings.set('hud', next);
+  /** @type {HTMLSelectElement} */ (byId('hud-select')).value = next;
+  app.notify(`Lines: ${next}`);
+}
+
 /** @param {Record<string, () => void>} actions @returns {Record<string, () => void>} by key code */
 export const keysOf = (actions) => ({
   KeyR: actions.recentre, KeyC: actions.recentre, KeyT: actions.enable, KeyF: actions.full,
   KeyP: actions.pip, KeyV: actions.split, KeyH: actions.help, KeyI: actions.instruments,
+  KeyU: actions.theme, KeyB: actions.panels,
   KeyG: actions['give-back'], KeyM: actions.mode, KeyO: actions.projection, Space: actions.front, Escape: actions.close,
 });
 

@@ -1,7 +1,7 @@
 // The readings beside the picture: two dials, counts, who is in command, what is wrong.
 
-const FULL_SCALE_MS = { head: 100, video: 200 };
-const GOOD_MS = { head: 35, video: 60 };
+import { level } from './hud.js';
+
 const NOTICE_MS = 2500;
 
 /** @typedef {{median: number | null, p95: number | null, count: number}} Summary */
@@ -13,14 +13,15 @@ function write(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
-/** @param {'head' | 'video'} name @param {Summary} summary @param {string} caption */
-export function showDial(name, { median, p95 }, caption) {
+/** @param {import('./hud_words.js').Definition} known @param {'head' | 'video'} name
+ * @param {Summary} summary @param {string} caption */
+export function showDial(known, name, { median, p95 }, caption) {
   const dial = byId(`dial-${name}`);
-  const share = (/** @type {number | null} */ ms) => Math.min(1, (ms ?? 0) / FULL_SCALE_MS[name]);
+  const share = (/** @type {number | null} */ ms) => 
+    Math.min(1, (ms ?? 0) / known.dials.full_ms[name]);
   dial.style.setProperty('--median', String(share(median)));
   dial.style.setProperty('--p95', String(share(p95)));
-  dial.dataset.level = median === null ? 'none'
-    : (p95 ?? 0) <= GOOD_MS[name] ? 'good' : (median <= 2 * GOOD_MS[name] ? 'fair' : 'poor');
+  dial.dataset.level = level(known, name, { median, p95 });
   write(part(dial, '.value'), median === null ? '–' : median.toFixed(median < 10 ? 1 : 0));
   write(part(dial, '.p95'), p95 === null ? 'p95 –' : `p95 ${p95.toFixed(p95 < 10 ? 1 : 0)} ms`);
   write(part(dial, '.caption'), caption);
@@ -92,6 +93,12 @@ export function showHead(head, state, before) {
 
 /** @param {number} hfovDeg */
 export const showField = (hfovDeg) => write(byId('field'), `${Math.round(hfovDeg)}°`);
+
+/** @param {string} text of the recording that is being made; nothing without one */
+export function showRecording(text) {
+  byId('recording').hidden = !text;
+  write(byId('recording'), text);
+}
 
 /** The page cannot go on. @param {string} text */
 export function showFatal(text) {

@@ -44,18 +44,18 @@ export function scaled({ x, y, width, height }, ratio) {
   };
 }
 
-const TAPE = { most: 420, least: 230, height: 62, gap: 10 };
-
 /** Where the tape of bearings goes: at the top of the pane between what stands there, else below.
- * @param {Rect} pane @param {Rect[]} boxes @returns {Rect} */
-export function tapePlace(pane, boxes) {
+ * @param {Rect} pane @param {Rect[]} boxes
+ * @param {{most: number, least: number, height: number, top: number}} tape as hud.json has it
+ * @returns {Rect} */
+export function tapePlace(pane, boxes, { most, least, height, top: gap }) {
   const centre = pane.x + pane.width / 2;
-  const near = boxes.filter((box) => box.y < pane.y + TAPE.height && box.y + box.height > pane.y
+  const near = boxes.filter((box) => box.y < pane.y + height && box.y + box.height > pane.y
     && box.x < pane.x + pane.width && box.x + box.width > pane.x);
   const room = Math.min(pane.width / 2, ...near.map((box) =>
-    Math.max(box.x - centre, centre - box.x - box.width))) - TAPE.gap;
-  const fits = 2 * room >= TAPE.least;
-  const width = Math.min(TAPE.most, fits ? 2 * room : pane.width - 2 * TAPE.gap);
+    Math.max(box.x - centre, centre - box.x - box.width))) - gap;
+  const fits = 2 * room >= least;
+  const width = Math.min(most, fits ? 2 * room : pane.width - 2 * gap);
   const top = fits ? pane.y : Math.max(...near.map((box) => box.y + box.height));
-  return { x: centre - width / 2, y: top + TAPE.gap, width, height: TAPE.height };
+  return { x: centre - width / 2, y: top + gap, width, height };
 }

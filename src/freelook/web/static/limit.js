@@ -85,6 +85,8 @@ export class LensLimit {
     this.last = null;
     /** whether the view is on its way to where it should be */
     this.moving = false;
+    /** how far the lens's edge keeps the view from where it was wanted, degrees */
+    this.holding = 0;
   }
 
   /** @param {Quaternion} wanted @param {Viewport} view @param {number} nowMs
@@ -95,6 +97,7 @@ export class LensLimit {
     this.moving = slewed !== limited;
     const shown = this.moving ? this.stopped(slewed, view, 0) : limited;
     this.last = { ms: nowMs, wanted, shown };
+    this.holding = (angleBetween(wanted, shown) * 180) / Math.PI;
     return shown;
   }
 

@@ -18,6 +18,7 @@ import { ClockOffset } from './statistics.js';
  * @property {{name: string, state: string, message: string, age_ms: number | null,
  *   rate_hz: number, counters: Record<string, number>}[]} trackers
  * @property {number} viewers @property {Vehicle} [vehicle]
+ * @property {{name: string, state: string, message: string, shown: number}[]} [recordings]
  */
 
 export const SILENT_MS = 1000; // the station sends its status four times a second
@@ -35,8 +36,13 @@ export class Link {
     this.arrivals = new Map();
     /** @type {Map<number, Quaternion>} RTP time stamp to the base in which heads turn in the frame */
     this.bases = new Map();
+    /** @type {Map<number, Quaternion | null>} RTP time stamp to the vehicle's attitude then, in head
+     * axes (north is ahead); null where that is not known */
+    this.worlds = new Map();
     /** of the newest frame told about */
     this.newestBase = IDENTITY;
+    /** @type {Quaternion | null} */
+    this.newestWorld = null;
     /** @type {Status | null} */
     this.status = null;
     this.bad = 0;
@@ -105,12 +111,14 @@ export class Link {
   }
 
   /** @param {any} message */
-  frame({ rtp, arrival, base }) {
+  frame({ rtp, arrival, base, world }) {
     if (!Number.isFinite(rtp) || !Number.isFinite(arrival)) return false;
     this.newestBase = (Array.isArray(base) ? normalised(base) : null) ?? IDENTITY;
     this.arrivals.set(rtp, arrival);
     this.bases.set(rtp, this.newestBase);
-    for (const kept of [this.arrivals, this.bases]) {
+    this.newestWorld = Array.isArray(world) ? normalised(world) : null;
+    this.worlds.set(rtp, this.newestWorld);
+    for (const kept of [this.arrivals, this.bases, this.worlds]) {
       if (kept.size > FRAMES_KEPT) kept.delete(kept.keys().next().value ?? 0);
     }
     this.onFrame(rtp);
@@ -128,6 +136,12 @@ export class Link {
    * that was not told about yet. @param {number | null} rtp @returns {Quaternion | null} */
   baseOf(rtp) {
     return rtp === null ? this.newestBase : this.bases.get(rtp) ?? null;
+  }
+
+  /** The vehicle's attitude in a frame, as `baseOf`. @param {number | null} rtp
+   * @returns {Quaternion | null} */
+  worldOf(rtp) {
+    return rtp === null ? this.newestWorld : this.worlds.get(rtp) ?? null;
   }
 
   /** When the frame came to the station, page time; null if not known.

@@ -3,7 +3,7 @@
 import { App } from './app.js';
 import { makeHooks } from './hooks.js';
 import { showConditions, showFatal } from './instruments.js';
-import { getShader, getStation } from './station.js';
+import { getHud, getShader, getStation } from './station.js';
 
 const RETRY_MS = 2000;
 
@@ -24,8 +24,8 @@ async function start() {
   const why = missing();
   if (why) return showFatal(why);
   try {
-    const [station, shader] = await Promise.all([getStation(), getShader()]);
-    const app = new App(station, shader);
+    const [station, shader, hud] = await Promise.all([getStation(), getShader(), getHud()]);
+    const app = new App(station, shader, hud);
     Object.assign(window, { freelook: makeHooks(app) });
     app.renderer.canvas.addEventListener('webglcontextlost', () => location.reload());
   } catch (error) {

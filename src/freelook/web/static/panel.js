@@ -4,8 +4,9 @@ import { PROJECTIONS } from './projections.js';
 import { INPUTS } from './settings.js';
 
 /** @param {HTMLElement} form @param {import('./settings.js').Settings} settings
- * @param {string[]} modes @param {(mode: string) => void} setMode */
-export function fillPanel(form, settings, modes, setMode) {
+ * @param {string[]} modes @param {import('./hud_words.js').Definition} hud
+ * @param {(mode: string) => void} setMode */
+export function fillPanel(form, settings, modes, hud, setMode) {
   const rows = Object.entries(INPUTS).map(([input, { title, axes }]) =>
     fieldset(title, axes.flatMap((axis) => (input === 'phone'
       ? [axisRow(settings, input, axis), deadZoneRow(settings, input, axis)]
@@ -17,13 +18,15 @@ export function fillPanel(form, settings, modes, setMode) {
   const reset = element('button', { type: 'button', textContent: 'Reset all' });
   reset.addEventListener('click', () => {
     settings.reset();
-    fillPanel(form, settings, modes, setMode);
+    fillPanel(form, settings, modes, hud, setMode);
   });
   const projections = Object.keys(PROJECTIONS).map((name) => /** @type {[string, string]} */
     ([name, name]));
+  const themes = Object.entries(hud.themes).map(([name, { about }]) => /** @type {[string, string]} */
+    ([name, `${name}: ${about}`]));
   const view = fieldset('View', [modeRow(modes, setMode),
     choice(settings, 'projection', 'Projection', projections), choice(settings, 'limit',
-    'Past the lens’s edge', [['black', 'black'], ['soft', 'stop softly before it']])]);
+    'Past the lens’s edge', [['black', 'black'], ['soft', 'stop softly before it']]), choice(settings, 'hud', 'Lines', themes)]);
   form.replaceChildren(...rows, view, reset);
 }
 

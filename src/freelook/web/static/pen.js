@@ -1,242 +1,189 @@
-// Lines and words over the picture, drawn with WebGL2 into the same canvas: they belong to the
-// same frame as the picture, and cost no second full-screen layer.
+// Draws the HUD's shapes with WebGL2 into the same canvas: they belong to the same frame as the
+// picture, and cost no second full-screen layer. freelook/hud/ink.py and renderers/gl_pen.py do the
+// same, with the same shader.
 
+import { makeSheet } from './letters.js';
+import { scaled } from './layout.js';
 import { buildProgram } from './shader.js';
 
-/** @typedef {import('./camera.js').Point} Point */
 /** @typedef {import('./renderer.js').Rect} Rect */
+/** @typedef {import('./hud.js').Shape} Shape */
+/** @typedef {import('./letters.js').Sheet} Sheet */
 /** @typedef {[number, number, number, number]} Color red, green, blue, opacity; 0 to 1 */
 
-/** @type {Record<string, Color>} */
-export const COLORS = {
-  line: [0.553, 1, 0.773, 1],
-  bright: [0.918, 1, 0.961, 1],
-  amber: [1, 0.82, 0.4, 1],
-  rim: [0, 0.047, 0.039, 0.55],
-  box: [0.016, 0.07, 0.063, 0.85],
-};
-
-const GLYPHS = ' 0123456789+−°ACDEGHILOPRST';
-const FONT = 'ui-monospace, "SF Mono", "Cascadia Mono", "DejaVu Sans Mono", monospace';
-const RIM_PX = 1.25;
-
-const TO_CLIP = 'vec4(2.0 * p.x / canvas.x - 1.0, 1.0 - 2.0 * p.y / canvas.y, 0.0, 1.0)';
-
-// Each instance is a straight piece; its corners lie a pixel outside for the soft edge.
-const LINE_VERTEX = `#version 300 es
-layout(location = 0) in vec4 ends;
-uniform vec2 canvas;
-uniform float half_width;
-out float across;
-void main() {
-  vec2 along = ends.zw - ends.xy;
-  vec2 normal = vec2(-along.y, along.x) / max(length(along), 1e-6);
-  across = (half_width + 1.0) * float(2 * (gl_VertexID & 1) - 1);
-  vec2 p = ends.xy + along * float(gl_VertexID >> 1) + normal * across;
-  gl_Position = ${TO_CLIP};
-}`;
-
-const LINE_FRAGMENT = `#version 300 es
+const HEADER = `#version 300 es
 precision highp float;
-in float across;
-uniform float half_width;
-uniform vec4 color;
-out vec4 fragment;
-void main() {
-  fragment = vec4(color.rgb, color.a * clamp(half_width + 0.5 - abs(across), 0.0, 1.0));
-}`;
-
-// Each instance is one letter: x, y of its cell, number in the sheet.
-const TEXT_VERTEX = `#version 300 es
-layout(location = 0) in vec3 letter;
-uniform vec2 canvas;
-uniform vec2 cell;
-out vec2 texel;
-void main() {
-  vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1) * cell;
-  vec2 p = letter.xy + corner;
-  texel = corner + vec2(letter.z * cell.x, 0.0);
-  gl_Position = ${TO_CLIP};
-}`;
-
-const TEXT_FRAGMENT = `#version 300 es
-precision highp float;
-in vec2 texel;
-uniform sampler2D sheet;
-uniform float opacity;
-out vec4 fragment;
-void main() {
-  fragment = texelFetch(sheet, ivec2(texel), 0) * vec4(1.0, 1.0, 1.0, opacity);
-}`;
-
-const SHEET_UNIT = 5;
+precision highp int;
+`;
+const SHEET_UNIT = 6;
+const SHARES = { left: 0, middle: 0.5, right: 1 };
 
 export class Pen {
-  /** @param {WebGL2RenderingContext} gl */
-  constructor(gl) {
+  /** @param {WebGL2RenderingContext} gl
+   * @param {{source: string, known: import('./hud_words.js').Definition}} hud */
+  constructor(gl, { source, known }) {
     this.gl = gl;
-    this.line = buildProgram(gl, LINE_VERTEX, LINE_FRAGMENT);
-    this.letters = buildProgram(gl, TEXT_VERTEX, TEXT_FRAGMENT);
-    this.pieces = instances(gl, 4);
-    this.places = instances(gl, 3);
-    /** @type {Map<string, Sheet>} */
+    this.known = known;
+    const program = (/** @type {string} */ kind) => buildProgram(gl,
+      `${HEADER}#define ${kind}\n#define VERTEX\n${source}`,
+      `${HEADER}#define ${kind}\n#define FRAGMENT\n${source}`);
+    this.line = { program: program('LINE'), ...instances(gl, [4, 1, 4]) };
+    this.letter = { program: program('LETTER'), ...instances(gl, [4, 2, 4]) };
+    /** @type {Map<number, Sheet>} by size in pixels */
     this.sheets = new Map();
+    /** @type {WebGLTexture | null} all sheets, one below the other */
+    this.texture = null;
     this.ratio = 1;
-    this.opacity = 1;
-    /** @type {Point} */
-    this.origin = [0, 0];
+    this.theme = known.themes[Object.keys(known.themes)[0]];
   }
 
-  /** Starts drawing on the canvas. @param {number} ratio canvas pixels per unit */
-  begin(ratio) {
-    const { gl } = this;
-    if (ratio !== this.ratio) this.forget();
-    this.ratio = ratio;
+  /** Starts drawing on the canvas. @param {number} ratio canvas pixels per point
+   * @param {string} theme */
+  begin(ratio, theme) {
+    const { gl, known } = this;
+    const wanted = known.themes[theme] ?? this.theme;
+    if (ratio !== this.ratio || wanted !== this.theme) this.forget();
+    [this.ratio, this.theme] = [ratio, wanted];
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-    gl.viewport(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
-    gl.enable(gl.SCISSOR_TEST);
   }
 
   end() {
     this.gl.disable(this.gl.BLEND);
-    this.gl.disable(this.gl.SCISSOR_TEST);
   }
 
   forget() {
-    for (const { texture } of this.sheets.values()) this.gl.deleteTexture(texture);
+    this.gl.deleteTexture(this.texture);
+    this.texture = null;
     this.sheets.clear();
   }
 
-  /** Only inside `rect`, whose corner becomes the origin. @param {Rect} rect */
-  inside({ x, y, width, height }) {
-    const { gl, ratio } = this;
-    this.origin = [x * ratio, y * ratio];
-    const bottom = gl.drawingBufferHeight - (y + height) * ratio;
-    gl.scissor(...box(x * ratio, bottom, width * ratio, height * ratio));
+  /** @param {Shape[]} shapes in points from the corner of `rect` @param {Rect} rect */
+  draw(shapes, rect) {
+    const { gl, line, letter } = this;
+    const { x, y, width, height } = scaled(rect, this.ratio);
+    gl.viewport(x, gl.drawingBufferHeight - y - height, width, height);
+    const pieces = shapes.flatMap((shape) => this.piecesOf(shape));
+    this.render(line, pieces, 9, [width, height], () => {});
+    const letters = shapes.flatMap((shape) => this.lettersOf(shape));
+    if (!letters.length) return;
+    this.useSheets();
+    // first all rims, then the strokes: no rim lies on a neighbour's stroke
+    for (const under of [1, 0]) {
+      this.render(letter, letters, 10, [width, height], ({ at }) => {
+        gl.uniform1i(at('sheet'), SHEET_UNIT);
+        gl.uniform4fv(at('rim'), this.theme.rim);
+        gl.uniform1i(at('under'), under);
+      });
+    }
   }
 
-  /** @param {(Point | null)[][]} lines broken at null @param {number} width
-   * @param {Color} color with a dark rim, so that it shows on any picture */
-  stroke(lines, width, color = COLORS.line) {
-    const count = this.load(lines);
-    this.drawPieces(count, width / 2 + RIM_PX, COLORS.rim);
-    this.drawPieces(count, width / 2, color);
-  }
-
-  /** @param {Rect} rect */
-  fill({ x, y, width, height }) {
-    const middle = y + height / 2;
-    this.drawPieces(this.load([[[x, middle], [x + width, middle]]]), height / 2, COLORS.box);
-  }
-
-  /** @param {(Point | null)[][]} lines @returns {number} of straight pieces */
-  load(lines) {
-    const { gl, ratio, origin: [x, y] } = this;
-    const values = lines.flatMap((points) => points.slice(1).flatMap((to, i) => {
-      const from = points[i];
-      if (!from || !to) return [];
-      return [x + from[0] * ratio, y + from[1] * ratio, x + to[0] * ratio, y + to[1] * ratio];
-    }));
-    gl.bindVertexArray(this.pieces.array);
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.pieces.buffer);
+  /** @param {{program: import('./shader.js').Program, array: any, buffer: any}} what
+   * @param {number[]} values @param {number} count of one instance @param {number[]} size
+   * @param {(program: import('./shader.js').Program) => void} set more uniforms */
+  render({ program, array, buffer }, values, count, size, set) {
+    const { gl } = this;
+    gl.useProgram(program.handle);
+    gl.uniform2f(program.at('canvas'), size[0], size[1]);
+    gl.uniform2f(program.at('middle'), size[0] / 2, size[1] / 2);
+    gl.uniform4f(program.at('viewer'), 0, 0, 0, 0);
+    set(program);
+    gl.bindVertexArray(array);
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
     gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(values), gl.STREAM_DRAW);
-    return values.length / 4;
+    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, values.length / count);
   }
 
-  /** @param {number} count @param {number} halfWidth @param {Color} color */
-  drawPieces(count, halfWidth, [red, green, blue, alpha]) {
-    const { gl, line } = this;
-    gl.useProgram(line.handle);
-    gl.uniform2f(line.at('canvas'), gl.drawingBufferWidth, gl.drawingBufferHeight);
-    gl.uniform1f(line.at('half_width'), halfWidth * this.ratio);
-    gl.uniform4f(line.at('color'), red, green, blue, alpha * this.opacity);
-    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, count);
+  /** x0, y0, x1, y1, half width, colour, of each straight piece. @param {Shape} shape
+   * @returns {number[]} */
+  piecesOf(shape) {
+    const { ratio, theme } = this;
+    if (shape.kind === 'text') return [];
+    const color = this.color(shape.role, shape.opacity);
+    if (shape.kind === 'box') {
+      const { x, y, width, height } = shape.rect;
+      const middle = (y + height / 2) * ratio;
+      return [x * ratio, middle, (x + width) * ratio, middle, (height / 2) * ratio, ...color];
+    }
+    const half = (shape.width * theme.weight * ratio) / 2;
+    const [red, green, blue, alpha] = theme.rim;
+    const rim = [half + theme.rim_width * ratio, red, green, blue, alpha * shape.opacity];
+    return [rim, [half, ...color]].flatMap((rest) => shape.pieces.flatMap(([x0, y0, x1, y1]) =>
+      [x0 * ratio, y0 * ratio, x1 * ratio, y1 * ratio, ...rest]));
   }
 
-  /** Words centred at (x, y). @param {string} text @param {number} x @param {number} y
-   * @param {Color} color */
-  text(text, x, y, size = 12, color = COLORS.line) {
-    const { gl, letters, ratio, origin } = this;
-    const sheet = this.sheet(size, color);
-    const left = Math.round(origin[0] + x * ratio - (text.length * sheet.step) / 2 - sheet.margin);
-    const top = Math.round(origin[1] + y * ratio - sheet.cell[1] / 2);
-    const values = [...text].flatMap((glyph, i) =>
-      [left + Math.round(i * sheet.step), top, Math.max(0, GLYPHS.indexOf(glyph))]);
-    gl.bindVertexArray(this.places.array);
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.places.buffer);
-    gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(values), gl.STREAM_DRAW);
-    gl.useProgram(letters.handle);
-    gl.activeTexture(gl.TEXTURE0 + SHEET_UNIT);
-    gl.bindTexture(gl.TEXTURE_2D, sheet.texture);
-    gl.uniform1i(letters.at('sheet'), SHEET_UNIT);
-    gl.uniform1f(letters.at('opacity'), this.opacity);
-    gl.uniform2f(letters.at('canvas'), gl.drawingBufferWidth, gl.drawingBufferHeight);
-    gl.uniform2f(letters.at('cell'), ...sheet.cell);
-    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, text.length);
+  /** Left, top, width, height, place in the sheets, colour, of each letter, on whole pixels: they
+   * stay crisp. @param {Shape} shape @returns {number[]} */
+  lettersOf(shape) {
+    if (shape.kind !== 'text') return [];
+    const { ratio } = this;
+    const sheet = this.sheet(shape.size * ratio);
+    const color = this.color(shape.role, shape.opacity);
+    const letters = [...shape.text];
+    const share = SHARES[/** @type {keyof typeof SHARES} */ (shape.anchor)];
+    const start = shape.x * ratio - share * letters.length * sheet.step;
+    const left = Math.floor(start - (sheet.cell[0] - sheet.step) / 2 + 0.5);
+    const top = Math.floor(shape.y * ratio - sheet.cell[1] / 2 + 0.5);
+    return letters.flatMap((letter, i) => (letter === ' ' ? [] : [
+      left + Math.floor(i * sheet.step + 0.5), top, ...sheet.cell,
+      sheet.cell[0] * (sheet.numbers.get(letter) ?? 0), sheet.row, ...color,
+    ]));
   }
 
-  /** @param {number} size @param {Color} color @returns {Sheet} */
-  sheet(size, color) {
-    const key = `${size} ${color}`;
-    const sheet = this.sheets.get(key) ?? makeSheet(this.gl, size * this.ratio, color, this.ratio);
-    this.sheets.set(key, sheet);
+  /** @param {string} role @param {number} opacity @returns {Color} */
+  color(role, opacity) {
+    const [red, green, blue, alpha = 1] = this.theme[role];
+    return [red, green, blue, alpha * opacity];
+  }
+
+  /** @param {number} sizePx @returns {Sheet} */
+  sheet(sizePx) {
+    const made = this.sheets.get(sizePx);
+    if (made) return made;
+    const sheet = makeSheet(this.known, sizePx, this.theme.rim_width * this.ratio, this.theme.weight);
+    sheet.row = [...this.sheets.values()].reduce((sum, { height }) => sum + height, 0);
+    this.sheets.set(sizePx, sheet);
+    this.gl.deleteTexture(this.texture);
+    this.texture = null;
     return sheet;
   }
+
+  useSheets() {
+    const { gl } = this;
+    gl.activeTexture(gl.TEXTURE0 + SHEET_UNIT);
+    if (this.texture) return gl.bindTexture(gl.TEXTURE_2D, this.texture);
+    const sheets = [...this.sheets.values()];
+    const width = Math.max(...sheets.map((sheet) => sheet.width));
+    const height = sheets.reduce((sum, sheet) => sum + sheet.height, 0);
+    this.texture = /** @type {WebGLTexture} */ (gl.createTexture());
+    gl.bindTexture(gl.TEXTURE_2D, this.texture);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
+    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RG8, width, height);
+    gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
+    for (const sheet of sheets) {
+      gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, sheet.row, sheet.width, sheet.height, gl.RG,
+        gl.UNSIGNED_BYTE, sheet.covered);
+    }
+    return undefined;
+  }
 }
 
-/** @typedef {{texture: WebGLTexture, cell: [number, number], step: number, margin: number}} Sheet
- * all letters in a row; cells overlap by their margins when written */
-
-/** @param {WebGL2RenderingContext} gl @param {number} size @param {Color} color
- * @param {number} ratio @returns {Sheet} */
-function makeSheet(gl, size, color, ratio) {
-  const canvas = document.createElement('canvas');
-  const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d'));
-  const font = `600 ${size}px ${FONT}`;
-  context.font = font;
-  const step = context.measureText('0').width;
-  const margin = Math.ceil(2 * ratio);
-  /** @type {[number, number]} */
-  const cell = [Math.ceil(step) + 2 * margin, Math.ceil(1.3 * size) + 2 * margin];
-  [canvas.width, canvas.height] = [cell[0] * GLYPHS.length, cell[1]];
-  context.font = font; // a new size forgets it
-  context.textBaseline = 'middle';
-  context.lineWidth = 3 * ratio;
-  context.lineJoin = 'round';
-  [...GLYPHS].forEach((glyph, i) => {
-    const at = /** @type {const} */ ([i * cell[0] + margin, cell[1] / 2]);
-    context.strokeStyle = css(COLORS.rim);
-    context.strokeText(glyph, ...at);
-    context.fillStyle = css(color);
-    context.fillText(glyph, ...at);
-  });
-  const texture = /** @type {WebGLTexture} */ (gl.createTexture());
-  gl.activeTexture(gl.TEXTURE0 + SHEET_UNIT);
-  gl.bindTexture(gl.TEXTURE_2D, texture);
-  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
-  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
-  gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, canvas);
-  return { texture, cell, step, margin };
-}
-
-/** One float attribute of `size` numbers for each instance.
- * @param {WebGL2RenderingContext} gl @param {number} size */
-function instances(gl, size) {
+/** Float attributes of each instance, so many numbers each.
+ * @param {WebGL2RenderingContext} gl @param {number[]} counts */
+function instances(gl, counts) {
   const array = gl.createVertexArray();
   const buffer = gl.createBuffer();
   gl.bindVertexArray(array);
   gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
-  gl.enableVertexAttribArray(0);
-  gl.vertexAttribPointer(0, size, gl.FLOAT, false, 0, 0);
-  gl.vertexAttribDivisor(0, 1);
+  const whole = counts.reduce((sum, count) => sum + count, 0);
+  let before = 0;
+  counts.forEach((count, i) => {
+    gl.enableVertexAttribArray(i);
+    gl.vertexAttribPointer(i, count, gl.FLOAT, false, 4 * whole, 4 * before);
+    gl.vertexAttribDivisor(i, 1);
+    before += count;
+  });
   return { array, buffer };
 }
-
-/** @param {Color} color */
-const css = ([red, green, blue, alpha]) =>
-  `rgba(${Math.round(red * 255)}, ${Math.round(green * 255)}, ${Math.round(blue * 255)}, ${alpha})`;
-
-/** @param {number[]} numbers @returns {[number, number, number, number]} */
-const box = (...numbers) => /** @type {any} */ (numbers.map((value) => Math.round(value)));

@@ -14,8 +14,9 @@ import { focalPx, projectionOf } from './viewport.js';
 export class Renderer {
   /** Throws an Error with a sentence for the user where WebGL2 is missing.
    * @param {HTMLCanvasElement} canvas @param {string} shaderBody
-   * @param {import('./camera.js').Camera} profile */
-  constructor(canvas, shaderBody, profile) {
+   * @param {import('./camera.js').Camera} profile
+   * @param {import('./station.js').Hud} [hud] what is drawn over views, if anything is */
+  constructor(canvas, shaderBody, profile, hud) {
     const gl = canvas.getContext('webgl2', {
       alpha: false, antialias: false, depth: false,
       powerPreference: 'high-performance',
@@ -35,7 +36,7 @@ export class Renderer {
       const { size, values } = profile.offsets;
       gl.texImage2D(gl.TEXTURE_2D, 0, gl.RG32F, size, size, 0, gl.RG, gl.FLOAT, values);
     }
-    this.pen = new Pen(gl);
+    this.pen = hud && new Pen(gl, hud);
     this.noAttributes = gl.createVertexArray();
   }
 

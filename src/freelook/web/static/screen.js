@@ -1,15 +1,16 @@
 // The stage: which panes there are, and what is drawn in each.
 
+import { MOVING, RESTING, placeOn, shapes } from './hud.js';
 import * as instruments from './instruments.js';
 import { panes, scaled, tapePlace } from './layout.js';
-import { drawCaption, drawHorizon, drawOutline, drawTape } from './overlay.js';
 import { PROJECTIONS } from './projections.js';
 import { IDENTITY } from './quaternion.js';
-import { filled, spanning } from './viewport.js';
+import { filled, outline, spanning } from './viewport.js';
 
 /** @typedef {import('./quaternion.js').Quaternion} Quaternion */
 /** @typedef {import('./viewport.js').Viewport} Viewport */
 /** @typedef {import('./renderer.js').Rect} Rect */
+/** @typedef {import('./hud.js').Shape} Shape */
 
 // Where software draws: what two cores can draw 60 times a second, beside decoding the video.
 const SOFTWARE_PIXELS = 640 * 360;
@@ -19,12 +20,18 @@ const MOST_RATIO = 2;
 
 export class Screen {
   /** @param {HTMLElement} stage @param {import('./renderer.js').Renderer} renderer
-   * @param {import('./settings.js').Settings} settings @param {import('./zoom.js').Zoom} zoom */
-  constructor(stage, renderer, settings, zoom) {
+   * @param {import('./settings.js').Settings} settings @param {import('./zoom.js').Zoom} zoom
+   * @param {import('./hud_words.js').Definition} hud */
+  constructor(stage, renderer, settings, zoom, hud) {
     this.stage = stage;
     this.renderer = renderer;
     this.settings = settings;
     this.zoom = zoom;
+    this.hud = hud;
+    /** what the HUD tells beside where the view looks @type {Partial<import('./hud.js').HudState>} */
+    this.told = {};
+    /** @type {Quaternion | null} the vehicle's attitude in the frame that is shown */
+    this.world = null;
     this.pip = byId('pip');
     this.pip.style.aspectRatio = renderer.profile.size.join(' / ');
     /** canvas pixels per CSS pixel */
@@ -70,8 +77,13 @@ export class Screen {
     this.fitCanvas();
     this.zoom.use(this.projection);
     const { renderer, zoom, settings: { values }, stage } = this;
+    const { classList } = document.documentElement;
+    classList.toggle('clean', !values.panels);
+    classList.toggle('lines', values.instruments);
+    const drawn = values.instruments && !values.panels ? JSON.stringify(this.told) : '';
     const key = [q, zoom.fieldDeg, this.projection, renderer.picture.version, renderer.grey, values.pip,
-      values.split, values.instruments, stage.clientWidth, stage.clientHeight].join();
+      values.split, values.instruments, values.hud, values.panels, this.world, drawn,
+      stage.clientWidth, stage.clientHeight].join();
     if (key === this.drawnKey) return false;
     this.drawnKey = key;
     this.drawPanes(q);
@@ -80,7 +92,7 @@ export class Screen {
 
   /** @param {Quaternion} q */
   drawPanes(q) {
-    const { renderer, ratio, projection } = this;
+    const { renderer, ratio, projection, settings: { values } } = this;
     const { main, forward, fisheye } = this.panes();
     const view = this.viewOn(main);
     renderer.clear();
@@ -89,28 +101,50 @@ export class Screen {
       const { hfovDeg } = this.viewOn(forward);
       renderer.drawView(scaled(forward, ratio), IDENTITY, hfovDeg, projection);
     }
-    renderer.pen.begin(ratio);
-    if (this.settings.get('instruments')) this.drawLines(main, view, q);
-    if (forward) drawCaption(renderer.pen, forward, 'STRAIGHT AHEAD');
-    renderer.pen.end();
     if (fisheye) this.drawFisheye(fisheye, view, q);
+    renderer.pen.begin(ratio, values.hud);
+    if (values.instruments) this.drawHud(main, view, q, fisheye);
+    if (forward) renderer.pen.draw(caption('STRAIGHT AHEAD', forward), forward);
+    renderer.pen.end();
     instruments.showField(view.hfovDeg);
   }
 
-  /** @param {Rect} main @param {Viewport} view @param {Quaternion} q */
-  drawLines(main, view, q) {
-    const { pen } = this.renderer;
-    if (view.projection !== 'crop') drawHorizon(pen, main, view, q); // only the lens knows where
-    drawTape(pen, tapePlace(main, [byId('top'), byId('readings')].map(rectOf)), q);
+  /** Beside the panels: what they do not show. Without them: everything.
+   * @param {Rect} main @param {Viewport} view @param {Quaternion} q @param {Rect | null} fisheye */
+  drawHud(main, view, q, fisheye) {
+    const { renderer: { pen }, hud, settings: { values: { panels: beside } } } = this;
+    const moving = MOVING.filter((part) => part !== 'field' || !(beside || fisheye));
+    const place = beside ? this.placeBesidePanels(main)
+      : placeOn(hud, main.width, main.height);
+    const state = this.stateOf(view, q);
+    pen.draw(shapes(hud, state, { ...place, parts: moving }), main);
+    if (!beside) pen.draw(shapes(hud, state, { ...place, parts: RESTING }), main);
+  }
+
+  /** @param {Rect} main @returns {import('./hud.js').Place} */
+  placeBesidePanels(main) {
+    const place = placeOn(this.hud, main.width, main.height);
+    const tape = tapePlace(main, [byId('top'), byId('readings')].map(rectOf), this.hud.tape);
+    return { ...place, tape: { ...tape, x: tape.x - main.x, y: tape.y - main.y } };
+  }
+
+  /** The numbers that the HUD shows. @param {Viewport} view @param {Quaternion} q
+   * @returns {import('./hud.js').HudState} */
+  stateOf({ hfovDeg, projection = 'perspective' }, q) {
+    const { profile } = this.renderer;
+    const lens = {
+      thetaMax: 2 * Math.atan(Math.sqrt(profile.tMax)), cameraFromHead: profile.cameraFromHead,
+    };
+    return { ...this.told, q, world: this.world, hfovDeg, projection, lens };
   }
 
   /** @param {Rect} rect @param {Viewport} view @param {Quaternion} q */
   drawFisheye(rect, view, q) {
-    const { renderer, ratio } = this;
+    const { renderer, ratio, settings: { values } } = this;
     const { x, y, width, height } = renderer.drawFisheye(scaled(rect, ratio));
     const place = { x: x / ratio, y: y / ratio, width: width / ratio, height: height / ratio };
-    renderer.pen.begin(ratio);
-    drawOutline(renderer.pen, place, renderer.camera, view, q);
+    renderer.pen.begin(ratio, values.hud);
+    renderer.pen.draw(outlineOn(place, renderer.camera, view, q), place);
     renderer.pen.end();
   }
 
@@ -125,6 +159,26 @@ export class Screen {
     if (canvas.width !== size[0]) canvas.width = size[0];
     if (canvas.height !== size[1]) canvas.height = size[1];
   }
+}
+
+/** A word at a pane's foot. @param {string} text @param {Rect} pane @returns {Shape[]} */
+const caption = (text, { height }) => [{
+  kind: 'text', text, x: 12, y: height - 16, size: 12, role: 'line', anchor: 'left', opacity: 1,
+}];
+
+/** The view's border on the whole fisheye.
+ * @param {Rect} place where the picture lies
+ * @param {import('./camera.js').Camera} camera @param {Viewport} view @param {Quaternion} q
+ * @returns {Shape[]} */
+function outlineOn(place, camera, view, q) {
+  const scale = [place.width / camera.size[0], place.height / camera.size[1]];
+  const points = outline(view, q, camera).map((pixel) =>
+    pixel && pixel.map((value, i) => (value + 0.5) * scale[i]));
+  const pieces = points.slice(1).flatMap((to, i) => {
+    const from = points[i];
+    return from && to ? [/** @type {any} */ ([...from, ...to])] : [];
+  });
+  return [{ kind: 'lines', pieces, width: 2, role: 'chosen', opacity: 1 }];
 }
 
 const byId = (/** @type {string} */ id) => /** @type {HTMLElement} */ (document.getElementById(id));

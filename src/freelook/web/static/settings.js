@@ -14,7 +14,9 @@ const DEFAULTS = {
   stick: 'rate', // or 'position'
   pip: true,
   split: 0,
-  instruments: true,
+  instruments: true, // the HUD
+  hud: 'day',
+  panels: true,
 };
 
 export class Settings {

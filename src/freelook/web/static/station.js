@@ -6,6 +6,7 @@
  * @property {import('./camera.js').CameraJson} camera @property {string[]} trackers
  * @property {number} hold_s @property {number} ease_s @property {number} hfov_deg
  * @property {string} [projection] of the views at the start
+ * @property {string} [hud] its theme at the start, or off
  * @property {string} limit soft or black: past the lens's edge @property {string[]} modes
  * @property {number} rate_deg_s of changes that are eased
  * @property {import('./zoom.js').ZoomLimits} zoom
@@ -34,6 +35,15 @@ export const getStation = async () => (await get('api/station')).json();
 
 /** @returns {Promise<string>} */
 export const getShader = async () => (await get('view.glsl')).text();
+
+/** @typedef {{known: import('./hud_words.js').Definition, source: string}} Hud hud.json, and the
+ * text of pen.glsl */
+
+/** @returns {Promise<Hud>} */
+export async function getHud() {
+  const [known, source] = await Promise.all([get('hud.json'), get('pen.glsl')]);
+  return { known: await known.json(), source: await source.text() };
+}
 
 /** @param {string} tracker @param {'recentre' | 'enable' | 'disable'} action
  * @returns {Promise<string | null>} null when done, else why not */

@@ -1,0 +1,56 @@
+"""Where the parts of a HUD go. Points: so many pixels that letters stay as large as they should."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .definition import definition
+
+POINTS_HIGH = 540  # of a view's shorter side: larger ones get larger letters
+MOST_PER_POINT = 8.0
+
+MOVING = ("horizon", "edge", "tape", "field")
+RESTING = ("state", "dials", "warnings")
+ALL = (*MOVING, *RESTING)
+
+
+@dataclass(frozen=True)
+class Rect:
+    x: float
+    y: float
+    width: float
+    height: float
+
+
+@dataclass(frozen=True)
+class Place:
+    """A view of width x height points, (0, 0) its top left corner; where the tape goes; from
+    where down there is room at the sides and in the middle; the parts that are drawn."""
+
+    width: float
+    height: float
+    tape: Rect
+    sides_y: float
+    middle_y: float
+    parts: tuple[str, ...] = ALL
+
+
+def pixels_per_point(size: tuple[int, int]) -> float:
+    """Of a view of this size in pixels; 1 at least."""
+    return min(max(min(size) / POINTS_HIGH, 1.0), MOST_PER_POINT)
+
+
+def place_of(width: float, height: float, parts: tuple[str, ...] = ALL) -> Place:
+    """With nothing else on the view."""
+    known = definition()
+    tape, margin = known["tape"], known.margin
+    narrow = width < tape["narrow"]
+    wanted = width - 2 * margin if narrow else width * tape["share"]
+    across = min(tape["most"], max(wanted, min(tape["least"], width - 2 * margin)))
+    rect = Rect((width - across) / 2, tape["top"], across, tape["height"])
+    below = rect.y + rect.height
+    sides_y = below if narrow else 0.0
+    # the tallest at the sides is the state
+    sides = margin + known["state"]["most"] * known["state"]["line"] - known["warnings"]["gap"] / 2
+    taken = below + sides if narrow else below
+    return Place(width, height, rect, sides_y, taken, parts)
