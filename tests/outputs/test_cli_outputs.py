@@ -33,6 +33,7 @@ def test_a_recording_goes_to_several_outputs_until_it_ends(
 ) -> None:
     """Two views of one grey recording: each output has its own size and head."""
     stream, file, shot = tmp_path / "stream.png", tmp_path / "view.mp4", tmp_path / "shot.png"
+    two = tmp_path / "two.png"
     address = f"udp://127.0.0.1:{free_port()}"
     receiving = (
         "-v",
@@ -52,6 +53,7 @@ def test_a_recording_goes_to_several_outputs_until_it_ends(
         f"stream:{address},size=160x96,head=observer",
         f"file:{file},size=96x64,yaw=20",
         f"snapshot:{shot},size=64x48,every=0.5",
+        f"snapshot:{two},size=128x96,every=0.5,layout=pip",
     )
     command = [
         sys.executable,
@@ -68,7 +70,7 @@ def test_a_recording_goes_to_several_outputs_until_it_ends(
     flight = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         assert receiver.wait(90) == 0  # what renders may have to be compiled first
-        wait_until(shot.is_file, timeout_s=30)
+        wait_until(lambda: shot.is_file() and two.is_file(), timeout_s=30)
         flight.send_signal(signal.SIGINT)
         out, err = flight.communicate(timeout=30)
     finally:
@@ -81,6 +83,8 @@ def test_a_recording_goes_to_several_outputs_until_it_ends(
     assert f"file:{file} live" in last
     assert read_size(stream) == (160, 96)
     assert read_size(shot) == (64, 48)
+    assert read_size(two) == (128, 96)
+    assert darkest(shot) > 100 > 30 > darkest(two)  # around the fisheye in its corner
     probe = ("-v", "error", "-count_frames", "-show_entries", "stream=width,nb_read_frames")
     seen = subprocess.run(
         ["ffprobe", *probe, "-of", "csv=p=0", str(file)], capture_output=True, text=True, check=True
@@ -98,6 +102,12 @@ def read_size(path: Path) -> tuple[int, int]:
     return picture.shape[1], picture.shape[0]
 
 
+def darkest(path: Path) -> int:
+    picture = cv2.imread(str(path))
+    assert picture is not None
+    return int(picture.min())
+
+
 @pytest.mark.parametrize(
     ("shows", "why"),
     [
@@ -107,6 +117,8 @@ def read_size(path: Path) -> tuple[int, int]:
         (("stream:udp://127.0.0.1:9,head=nobody",), "there is no head 'nobody'; heads: wander"),
         (("file:odd.mp4,size=0x0",), "too small"),
         (("file:odd.mp4,size=95x64",), "even width and height"),
+        (("file:odd.mp4,size=96x60,layout=quad",), "make both sides at least 64"),
+        (("file:odd.mp4,layout=six",), "known: quad, pip, panorama"),
     ],
 )
 def test_mistakes_are_said_before_the_flight(

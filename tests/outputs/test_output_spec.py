@@ -35,6 +35,7 @@ def test_a_fixed_direction_and_other_words() -> None:
     assert parse("snapshot:shots/,every=4").rate_hz == 0.25
     assert parse("stream:udp://[::1]:5,bitrate=800k").bitrate == 800_000
     assert parse("virtual-camera:/dev/video9").name == "virtual-camera:/dev/video9"
+    assert parse("file:a.mp4,layout=quad").layout == "quad"
     assert parse("page") == OutputSpec("page", text="page")
 
 

@@ -16,6 +16,7 @@ from ..head import Head
 from ..ingest import Ingest
 from ..mailbox import Mailbox
 from ..renderers import Renderer
+from ..renderers.layout import SMALLEST_PX, LayoutRenderer
 from ..rotations import body_from_view, head_angles_deg
 from ..session import Aim, Session, View
 from ..sinks import SinkSettings, check_sink, find, open_sink
@@ -108,6 +109,11 @@ def check(spec: OutputSpec, flight: Flight) -> None:
     view_of(spec, flight)
     if spec.kind in CODED and any(side % 2 for side in settings.size):
         raise SinkError(f"--show {spec.text}: video needs an even width and height")
+    if spec.layout and min(settings.size) < SMALLEST_PX:
+        raise SinkError(
+            f"--show {spec.text}: too small for several views; "
+            f"make both sides at least {SMALLEST_PX}"
+        )
     aim_of(spec, flight)
     check_sink(sink_argument(spec), settings)
 
@@ -119,7 +125,10 @@ def make_output(spec: OutputSpec, flight: Flight) -> Output:
     lens = write(Profile(camera))
 
     def make_session(box: Mailbox[Frame]) -> Session:
-        return Session(box, camera, aim, flight.renderer(), viewport, limit)
+        renderer = flight.renderer()
+        if spec.layout:
+            renderer = LayoutRenderer(renderer, spec.layout)
+        return Session(box, camera, aim, renderer, viewport, limit)
 
     def opened(color: ColorSpace) -> Sink:
         return open_sink(sink_argument(spec), **vars(settings_of(spec, color)))

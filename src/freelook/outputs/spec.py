@@ -13,10 +13,11 @@ from typing import Any
 from ..addresses import without_password
 from ..errors import SinkError
 from ..projections import PROJECTIONS
+from ..renderers.layout import LAYOUTS
 from ..sinks import By
 
 LOOK = ("yaw", "pitch", "roll")
-VIEW = ("size", "hfov", "projection", "head", *LOOK)
+VIEW = ("size", "hfov", "projection", "layout", "head", *LOOK)
 ENCODERS: tuple[By, ...] = ("auto", "software", "hardware")
 CODECS = ("h264", "h265")
 
@@ -46,6 +47,7 @@ class OutputSpec:
     size: tuple[int, int] | None = None
     hfov_deg: float | None = None
     projection: str | None = None
+    layout: str | None = None
     head: str | None = None
     look_deg: tuple[float, float, float] | None = None
     rate_hz: float | None = None
@@ -182,6 +184,7 @@ READERS: dict[str, Callable[[str], Any]] = {
     "size": _size,
     "hfov": _between(10, 360, "degrees"),
     "projection": _one_of(tuple(PROJECTIONS)),
+    "layout": _one_of(tuple(LAYOUTS)),
     "head": _some_text,
     "yaw": _number,
     "pitch": _number,
