@@ -23,6 +23,7 @@ from ..types import Picture, Plane
 from ..viewport import Viewport
 from . import kernels
 from .blank import Sampling, black_of, check_fits, plane_scales
+from .still import Band, StillView
 from .window import rim_px, window_of
 
 BAND_ROWS = 112  # about; measured
@@ -49,6 +50,7 @@ class CpuRenderer:
         self._scratch = [_Scratch() for _ in range(self._threads)]
         self._made_for: tuple[Camera | None, Viewport | None] = (None, None)
         self._filler: _Filler | None = None
+        self._still = StillView()
 
     def render(
         self, picture: Picture, camera: Camera, camera_from_view: Rotation, viewport: Viewport
@@ -63,10 +65,14 @@ class CpuRenderer:
         )
         planes = list(zip(picture.planes, view, scales, black_of(picture), strict=True))
         halves = 2 in scales
+        self._still.look(camera, viewport, camera_from_view, halves)
 
         def render_band(first_row: int, rows: int, scratch: _Scratch) -> None:
-            luma, chroma = scratch.maps(width, rows, halves)
-            rim = fill(first_row, luma, chroma)
+            def compute() -> Band:
+                luma, chroma = scratch.maps(width, rows, halves)
+                return luma, chroma, fill(first_row, luma, chroma)
+
+            luma, chroma, rim = self._still.band(first_row, compute)
             for plane, out, scale, black in planes:
                 maps = luma if scale == 1 else chroma
                 band = out[first_row // scale :][: maps.shape[1]]
