@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 
 from freelook.bench import calibrate as bench
+from freelook.bench import calibration_compared
 from freelook.bench.boards import Simulated, board, simulate
-from freelook.bench.calibrate import Ours, Row, Set, run
+from freelook.bench.calibrate import OURS, LeastPredicted, Ours, Row, Set, run
+from freelook.bench.calibration_compared import Timed, compared, timed
 from freelook.bench.calibration_peers import (
     MrcalSplined,
     OpenCVFisheye,
@@ -177,20 +179,44 @@ def test_a_failure_is_told_not_raised() -> None:
     assert row_of(Broken(CAMERA), small_set()).failed == "no"
 
 
+def pretend_to_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With one small set, and ways that know the answer."""
+    monkeypatch.setattr(bench, "simulated_sets", lambda: [small_set()])
+    monkeypatch.setattr(
+        bench, "run", lambda sets, choices, **more: run(sets, WAYS, (CHOICE,), **more)
+    )
+    quickly = Timed("small", 0.25, 0.5)
+    monkeypatch.setattr(calibration_compared, "timed", lambda each: quickly)
+
+
 def test_bench_calibrate_prints_tables_and_json(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(bench, "simulated_sets", lambda: [small_set()])
-    monkeypatch.setattr(bench, "run", lambda sets, **more: run(sets, WAYS, **more))
+    pretend_to_run(monkeypatch)
     assert main(["bench", "calibrate", "--quick", "--json"]) == 0
-    told, missing = json.loads(capsys.readouterr().out)
+    found = json.loads(capsys.readouterr().out)
+    ours, told, missing = found["rows"]
+    assert ours["way"] == "freelook, auto"
     assert told["way"] == "told"
     assert told["rms_px"] == pytest.approx(0.135, rel=0.1)
     assert told["cross_validated_px"] is None
     assert missing == {"set": "small", "way": "gone", "skipped": "it is not there"}
-    assert main(["bench", "calibrate", "--quick"]) == 0
+    assert found["compared"] == []
+    assert found["timed"] == [{"set": "small", "seconds": 0.25, "cpu_seconds": 0.5}]
+
+
+def test_bench_calibrate_says_how_near_the_best_ours_is(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pretend_to_run(monkeypatch)
+    assert main(["bench", "calibrate"]) == 0
     printed = capsys.readouterr().out
     assert "skipped: it is not there" in printed
+    assert "told, chosen" in printed
+    assert "small: freelook, auto succeeds" in printed
+    assert printed.count("best of the others 0.") == 2
+    assert printed.count("within 5 %: yes") == 2
+    assert "20 views of 50 corners, freelook, auto, from corners that are found: 0.25 s" in printed
     assert "--data FOLDER" in printed
 
 
@@ -199,7 +225,75 @@ class Gone(Told):
         return "it is not there"
 
 
-WAYS = (Told(CAMERA), Gone(CAMERA, "gone"))
+OURS_TOLD = Told(CAMERA, OURS[0].name)
+WAYS = (OURS_TOLD, Told(CAMERA), Gone(CAMERA, "gone"))
+NEARLY = Told(replace(CAMERA, lens=Equidistant(259.0)), "nearly")
+CHOICE = LeastPredicted("chosen", "some", (NEARLY, Told(CAMERA)))
+
+
+def test_the_way_that_predicts_best_is_chosen() -> None:
+    """Ways that are only there to be chosen from have no rows; without cross-validation there is
+    no choice."""
+    rows = list(run([small_set()], [OURS_TOLD], [CHOICE]))
+    assert [row.way for row in rows] == [OURS[0].name, "told, chosen"]
+    assert rows[1].cross_validated_px == rows[0].cross_validated_px
+    assert len(list(run([small_set()], [OURS_TOLD], [CHOICE], cross_validate=False))) == 1
+
+
+def test_nothing_to_choose_from_is_said() -> None:
+    gone = LeastPredicted("chosen", "some", (Gone(CAMERA, "gone"),))
+    hopeless = LeastPredicted("chosen", "some", (Told(replace(CAMERA, center=(-9e3, 0.0))),))
+    missing, failed = run([small_set()], [], [gone, hopeless])
+    assert (missing.way, missing.skipped) == ("some, chosen", "it is not there")
+    assert (failed.way, bool(failed.failed)) == ("some, chosen", True)
+
+
+def row(way: str, rms_px: float, cross_validated_px: float) -> Row:
+    return Row("a", way, rms_px, cross_validated_px)
+
+
+def test_a_fit_that_is_overfit_is_not_the_best() -> None:
+    """At most 10 % above the least RMS on views left out, which is ours here: 0.44."""
+    ours = row(OURS[0].name, 0.384, 0.400)
+    near, overfit = row("near", 0.370, 0.439), row("overfit", 0.300, 0.441)
+    (found,) = compared([ours, near, overfit, row("poor", 0.5, 0.43)])
+    assert found.predicting is not None
+    assert found.predicting.way == "poor"
+    assert (found.fitting, found.closest) == (near, overfit)
+    assert found.succeeds
+    assert found.predicts_near_best
+    assert found.fits_near_best  # 0.384 <= 1.05 * 0.370
+
+
+def test_ours_may_be_off_the_best() -> None:
+    (found,) = compared([row(OURS[0].name, 0.39, 0.43), row("better", 0.37, 0.40)])
+    assert not found.predicts_near_best
+    assert not found.fits_near_best
+    (alone,) = compared([row(OURS[0].name, 0.39, 0.43), Row("a", "theirs", failed="aborts")])
+    assert alone.fitting is alone.closest is None
+    assert alone.predicts_near_best
+    assert alone.fits_near_best
+
+
+def test_ours_as_it_comes_counts_and_not_the_best_of_ours() -> None:
+    """Another model of ours is neither ours nor one of the others."""
+    rows = [row(OURS[0].name, 0.50, 0.43), row(OURS[1].name, 0.30, 0.43), row("x", 0.40, 0.43)]
+    (found,) = compared(rows)
+    assert found.fitting == rows[2]
+    assert not found.fits_near_best
+
+
+def test_a_failure_of_ours_is_neither_near_nor_a_success() -> None:
+    (found,) = compared([Row("a", OURS[0].name, failed="no"), row("x", 0.4, 0.43)])
+    assert not found.succeeds
+    assert not found.predicts_near_best
+    assert not found.fits_near_best
+
+
+def test_the_least_of_a_few_times_is_told() -> None:
+    found = timed(small_set(), OURS_TOLD, 2)
+    assert found.set == "small"
+    assert 0 <= found.seconds < 60
 
 
 def test_a_folder_without_the_sets_is_said(

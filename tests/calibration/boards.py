@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import least_squares
-from scipy.spatial.transform import Rotation
 
 from freelook.bench.boards import Simulated, board, simulate
+from freelook.bench.calibration_trials import apart
 from freelook.calibration.bundle import Solution
 from freelook.calibration.calibrate import Calibration
 from freelook.calibration.field import seen_angle, with_field
 from freelook.calibration.parameters import HELD, Freedom, Parameters
-from freelook.calibration.slopes import project
-from freelook.calibration.uncertainty import grid_of, projection_uncertainty
+from freelook.calibration.uncertainty import projection_uncertainty
 from freelook.calibration.views import View
 from freelook.camera import Camera, make_camera
 from freelook.fitting.refit import refit
@@ -86,20 +84,6 @@ def views_of(
 ) -> Simulated:
     rng = np.random.default_rng(seed)
     return simulate(camera, BOARD, count, rng, noise_px=noise_px, outliers=outliers)
-
-
-def apart(camera: Camera, found: Camera, pixels: Floats) -> Floats:
-    """(n, 2) how far `camera` projects from where `found` does, for the rays of `pixels` in the
-    latter, once it is turned so that both agree best over the whole field of the latter."""
-    everywhere = found.ray(grid_of(found.size, 24))
-    everywhere = everywhere[np.isfinite(everywhere[:, 2])]
-
-    def off(turn: Floats, rays: Floats) -> Floats:
-        turned: Floats = Rotation.from_rotvec(turn).apply(rays)
-        return np.asarray(project(camera, turned) - project(found, rays))
-
-    turn: Floats = least_squares(lambda t: off(t, everywhere).ravel(), np.zeros(3)).x
-    return off(turn, found.ray(pixels))
 
 
 def sigmas_off(camera: Camera, calibration: Calibration) -> float:

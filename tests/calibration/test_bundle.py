@@ -18,7 +18,14 @@ from freelook.calibration.parameters import (
     lens_values,
     with_lens_values,
 )
-from freelook.calibration.slopes import cross_matrices, point_slopes, project, value_slopes
+from freelook.calibration.slopes import (
+    both_slopes,
+    cross_matrices,
+    point_slopes,
+    project,
+    turn_slopes,
+    value_slopes,
+)
 from freelook.calibration.views import Pose, View
 from freelook.errors import CalibrationError
 from freelook.lens import Floats, KannalaBrandt, model_name, vector
@@ -151,11 +158,12 @@ def rays_in(example: Example, count: int = 60) -> Floats:
     return np.stack(rays, axis=-1) * rng.uniform(0.2, 5.0, (count, 1))
 
 
+@pytest.mark.parametrize("first", [0, 1], ids=["on the axis too", "off the axis"])
 @pytest.mark.parametrize("example", ALL, ids=str)
-def test_slopes_by_the_point_are_those_of_the_projection(example: Example) -> None:
+def test_slopes_by_the_point_are_those_of_the_projection(example: Example, first: int) -> None:
     """Against differences of the projection itself; even powers of theta have a kink on the axis,
     where a difference sees half of it: 2e-6."""
-    camera, points = example.camera, rays_in(example)
+    camera, points = example.camera, rays_in(example)[first:]
     for axis in np.eye(3):
         h = 1e-6 * np.linalg.norm(points, axis=1, keepdims=True)
         change = project(camera, points + h * axis) - project(camera, points - h * axis)
@@ -185,6 +193,16 @@ def test_a_turn_moves_points_as_the_cross_matrix_says() -> None:
     rng = np.random.default_rng(12)
     v, w = rng.normal(size=(2, 20, 3))
     assert (cross_matrices(v) @ w[:, :, None])[:, :, 0] == pytest.approx(np.cross(v, w))
+    by_point = rng.normal(size=(20, 2, 3))
+    assert turn_slopes(by_point, v) == pytest.approx(-by_point @ cross_matrices(v))
+
+
+def test_both_slopes_are_those_that_each_gives() -> None:
+    for example in ALL:
+        points, parameters = rays_in(example), Parameters(example.camera, Freedom(skew=True))
+        by_values, by_point = both_slopes(parameters, parameters.values, points)
+        assert (by_values == value_slopes(parameters, parameters.values, points)).all()
+        assert (by_point == point_slopes(example.camera, points)).all()
 
 
 @pytest.mark.parametrize("example", ALL, ids=str)

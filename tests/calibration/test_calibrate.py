@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from boards import BOARD, SIZE, apart, fields_of, sigmas_off, some_pixels, truth, views_of
+from boards import BOARD, SIZE, fields_of, sigmas_off, some_pixels, truth, views_of
 from scipy.spatial.transform import Rotation
 
 from freelook.bench.boards import board, simulate
+from freelook.bench.calibration_trials import apart
 from freelook.calibration.bundle import Solution, rms
 from freelook.calibration.calibrate import Calibration, calibrate
 from freelook.calibration.candidates import OVERFIT, Candidate, chosen

@@ -6,9 +6,10 @@ from functools import cache
 
 import numpy as np
 import pytest
-from boards import CENTER, SIZE, apart, sigmas_off, some_pixels, truth, views_of
+from boards import CENTER, SIZE, sigmas_off, some_pixels, truth, views_of
 
 from freelook.bench.boards import Simulated, board, simulate
+from freelook.bench.calibration_trials import apart
 from freelook.calibration._surface import Surface, stereographic, stereographic_slopes
 from freelook.calibration.bundle import BoardProblem, rms, solve
 from freelook.calibration.calibrate import Calibration, calibrate

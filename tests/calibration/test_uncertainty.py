@@ -7,9 +7,10 @@ from functools import cache
 
 import numpy as np
 import pytest
-from boards import apart, field_camera, some_pixels, squared_sigmas, truth, views_of
+from boards import field_camera, some_pixels, squared_sigmas, truth, views_of
 
 from freelook.bench.boards import noisy_again
+from freelook.bench.calibration_trials import apart
 from freelook.calibration.bundle import Solution, solve
 from freelook.calibration.doubts import typical_uncertainty
 from freelook.calibration.parameters import Freedom, Parameters

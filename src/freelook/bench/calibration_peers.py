@@ -105,7 +105,7 @@ class MrcalSplined:
     """`mrcal-calibrate-cameras` with its splined stereographic model, on a cache of corners.
 
     It starts from a stereographic lens that shows 180 degrees over the width. How many control
-    points a set can carry its user has to know.
+    points a set can carry its user has to know, or to find out (see `calibrate.CHOSEN`).
     """
 
     control: tuple[int, int]
@@ -149,12 +149,13 @@ class MrcalSplined:
                 raise PeerFailed(f"its result is no lens: {error}") from None
 
 
+# From as dense as is usual down to nearly as few as there can be.
+MRCAL = tuple(MrcalSplined(control) for control in ((16, 12), (12, 9), (10, 8), (8, 6)))
 PEERS: tuple[Peer, ...] = (
     OpenCVFisheye(guess=False),
     OpenCVFisheye(guess=True),
     OpenCVOmnidir(),
-    MrcalSplined((16, 12)),
-    MrcalSplined((10, 8)),
+    MRCAL[0],
 )
 
 

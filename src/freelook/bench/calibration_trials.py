@@ -16,8 +16,8 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from ..calibration.bundle import REJECT
 from ..calibration.calibrate import Calibration, calibrate
+from ..calibration.minimise import REJECT
 from ..calibration.parameters import HELD
 from ..calibration.slopes import project
 from ..calibration.uncertainty import grid_of, projection_covariance

@@ -1,81 +1,62 @@
 """Bundle adjustment: lens, centre, pixel aspect and every pose at once, by least squares in pixels.
 
 Residuals are pixel distances, and the projection takes rays at any angle, so a point beyond 90
-degrees weighs like any other. Levenberg-Marquardt on the normal equations; poses meet each other
-only through the camera, so they are eliminated (Schur complement) and a step costs as much as the
-points are many.
-
-Outliers: first every point counts by the Geman-McClure weight at a scale taken from the residuals
-themselves; then points farther off than `REJECT` times the noise are dropped, and what is left is
-solved once more by plain least squares, so that the stated uncertainty means what it says.
+degrees weighs like any other. Levenberg-Marquardt on the normal equations, robustly where asked
+(see `minimise`); poses meet each other only through the camera, so they are eliminated (Schur
+complement) and a step costs as much as the points are many.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..camera import Camera
-from ..errors import CalibrationError, ProfileError
+from ..errors import CalibrationError
 from ..lens import Floats
 from .equations import Equations, Problem, Pull, State
+from .minimise import ENOUGH, FAR, STEPS, Bools, asked, graduated, minimise, robustly, squares
 from .parameters import Freedom, Parameters
-from .slopes import cross_matrices, point_slopes, project, value_slopes
+from .slopes import both_slopes, project, turn_slopes
 from .views import Pose, View
 
 __all__ = [
     "Adjusted",
     "BoardProblem",
+    "Fit",
     "Problem",
     "Solution",
     "State",
     "adjusted",
+    "fit",
     "resect",
     "resect_all",
     "rms",
     "solve",
 ]
 
-Bools = NDArray[np.bool_]
-
-STEPS = 60
-ENOUGH, ROUGHLY = 1e-8, 1e-3  # relative gain of a step that is the last
-REJECT = 4.5  # times the noise per coordinate: chance drops 4 in 100,000 good points
-FEWEST_COUNTED = 4  # points that a view needs for its pose to mean anything
 WORST_CONDITION = 1e14
 
 
 @dataclass(frozen=True)
-class Solution:
-    """A camera that fits the views, and what is known about it.
+class Fit:
+    """A camera that fits the views.
 
     camera      with `theta_max` as it was given; see `calibrate` for the field that was seen
     poses       the target's, one for each view
     residuals   (n, 2) for each view: seen minus projected, pixels
     inliers     (n,) for each view: the points that count
-    covariance  (k, k) of the free values (see `parameters`), from the residuals
-    names       of those
-    condition   of the scaled normal equations of the camera alone; above 1e14 they say nothing
     noise_px    standard deviation of a coordinate, from the points that count
-    together    how many times as far the views disagree on the camera as independent errors would
-                make them (1: not at all); the covariance takes it in
-    pull        what the free values were pulled to, if to anything; the covariance takes it in
     """
 
     camera: Camera
     poses: tuple[Pose, ...]
     residuals: tuple[Floats, ...]
     inliers: tuple[Bools, ...]
-    covariance: Floats
-    names: tuple[str, ...]
-    condition: float
     noise_px: float
-    together: float
-    pull: Pull | None = None
 
     @property
     def rms_px(self) -> float:
@@ -85,10 +66,29 @@ class Solution:
         )
 
 
+@dataclass(frozen=True)
+class Solution(Fit):
+    """And what is known about it.
+
+    covariance  (k, k) of the free values (see `parameters`), from the residuals
+    names       of those
+    condition   of the scaled normal equations of the camera alone; above 1e14 they say nothing
+    together    how many times as far the views disagree on the camera as independent errors would
+                make them (1: not at all); the covariance takes it in
+    pull        what the free values were pulled to, if to anything; the covariance takes it in
+    """
+
+    covariance: Floats
+    names: tuple[str, ...]
+    condition: float
+    together: float
+    pull: Pull | None = None
+
+
 def rms(residuals: Floats) -> float:
     """Root of the mean squared length of (n, 2) residuals; NaN of none."""
-    squares = _squares(residuals)
-    return float(np.sqrt(squares.mean())) if len(squares) else float("nan")
+    squared = squares(residuals)
+    return float(np.sqrt(squared.mean())) if len(squared) else float("nan")
 
 
 def solve(
@@ -102,6 +102,7 @@ def solve(
     steps: int = STEPS,
     enough: float = ENOUGH,
     pull: Pull | None = None,
+    damping: float = FAR,
 ) -> Solution:
     """Adjust everything, starting from a camera and poses that are about right.
 
@@ -109,19 +110,75 @@ def solve(
     steps    bounds each minimisation
     enough   relative gain of a step that is the last
     pull     what the free values are pulled to
+    damping  of the first step: `NEAR` where camera and poses are nearly right
 
     A view with fewer than 4 points that count keeps its pose and counts for nothing.
     CalibrationError when the views do not determine the camera.
     """
     problem = BoardProblem(views, camera, freedom or Freedom(), pull)
-    state = State.of(problem.parameters.values, poses)
     with np.errstate(all="ignore"):  # steps may lead anywhere; what is no number is not taken
-        if robust:
-            state, weights = _robustly(problem, state, steps, enough)
-        else:
-            weights = _asked(problem, counted)
-            state = _minimise(problem, state, lambda _: weights, steps, enough)
-        return _solution(problem, state, weights)
+        state, weights = _settled(problem, poses, robust, counted, steps, enough, damping)
+        known = _known(problem, state, weights)
+    plain = _fit(problem, state, known.residuals, weights, known.noise_px)
+    return Solution(
+        **vars(plain),
+        covariance=known.covariance,
+        names=problem.parameters.names,
+        condition=known.condition,
+        together=known.together,
+        pull=pull,
+    )
+
+
+def fit(
+    camera: Camera,
+    poses: Sequence[Pose],
+    views: Sequence[View],
+    freedom: Freedom | None = None,
+    *,
+    robust: bool = True,
+    counted: Sequence[Bools] | None = None,
+    steps: int = STEPS,
+    enough: float = ENOUGH,
+    pull: Pull | None = None,
+    damping: float = FAR,
+) -> Fit:
+    """As `solve`, when nothing else need be known: nor whether the views determine the camera."""
+    problem = BoardProblem(views, camera, freedom or Freedom(), pull)
+    with np.errstate(all="ignore"):
+        state, weights = _settled(problem, poses, robust, counted, steps, enough, damping)
+        residuals = problem.residuals(state)
+        variance = float(weights @ squares(residuals)) / _surplus(problem, state, weights)
+    return _fit(problem, state, residuals, weights, float(np.sqrt(variance)))
+
+
+def _settled(
+    problem: BoardProblem,
+    poses: Sequence[Pose],
+    robust: bool,
+    counted: Sequence[Bools] | None,
+    steps: int,
+    enough: float,
+    damping: float,
+) -> tuple[State, Floats]:
+    """Where the minimum is, and the weights (n,) of all points."""
+    state = State.of(problem.parameters.values, poses)
+    if robust:
+        return robustly(problem, state, steps, enough, damping)
+    weights = asked(problem, counted)
+    return minimise(problem, state, lambda _: weights, steps, enough, damping), weights
+
+
+def _fit(
+    problem: BoardProblem, state: State, residuals: Floats, weights: Floats, noise_px: float
+) -> Fit:
+    return Fit(
+        problem.parameters.camera_of(state.values),
+        state.poses,
+        tuple(residuals[part] for part in problem.parts),
+        tuple(weights[part] > 0 for part in problem.parts),
+        noise_px,
+    )
 
 
 def resect(camera: Camera, pose: Pose, view: View) -> tuple[Pose, Floats]:
@@ -138,6 +195,8 @@ def resect_all(
     *,
     robust: bool = False,
     steps: int = STEPS,
+    enough: float = ENOUGH,
+    damping: float = FAR,
 ) -> tuple[tuple[Pose, ...], tuple[Floats, ...]]:
     """The best pose of each view in a known camera, and residuals (n, 2) of all points.
 
@@ -148,10 +207,10 @@ def resect_all(
     state = State.of(np.zeros(0), poses)
     with np.errstate(all="ignore"):
         if robust:
-            state = _graduated(problem, state, steps)
+            state = graduated(problem, state, steps, damping)
         else:
-            weights = _asked(problem, counted)
-            state = _minimise(problem, state, lambda _: weights, steps)
+            weights = asked(problem, counted)
+            state = minimise(problem, state, lambda _: weights, steps, enough, damping)
         residuals = problem.residuals(state)
     return state.poses, tuple(residuals[part] for part in problem.parts)
 
@@ -176,8 +235,7 @@ class BoardProblem:
 
     def turned(self, state: State) -> Floats:
         """The points (n, 3) by the rotations alone."""
-        each = zip(self.parts, state.turns, strict=True)
-        return np.concatenate([self.points[part] @ turn.T for part, turn in each])
+        return np.einsum("nij,nj->ni", state.turns[self.view_of], self.points)
 
     def residuals(self, state: State) -> Floats:
         camera = self.parameters.camera_of(state.values)
@@ -187,130 +245,8 @@ class BoardProblem:
         """d pixel / d values (n, 2, k) and d pixel / d (rotation vector, shift) (n, 2, 6)."""
         turned = self.turned(state)
         points = turned + state.shifts[self.view_of]
-        by_camera = value_slopes(self.parameters, state.values, points)
-        by_shift = point_slopes(self.parameters.camera_of(state.values), points)
-        return by_camera, np.concatenate([-by_shift @ cross_matrices(turned), by_shift], axis=-1)
-
-
-def _asked(problem: Problem, counted: Sequence[Bools] | None) -> Floats:
-    if counted is None:
-        return _enough(problem, np.ones(problem.count))
-    return _enough(problem, np.concatenate(counted).astype(np.float64))
-
-
-def _enough(problem: Problem, weights: Floats) -> Floats:
-    """Weights without those of views that have too few points left for a pose."""
-    weights = weights.copy()
-    for part in problem.parts:
-        if (weights[part] > 0).sum() < FEWEST_COUNTED:
-            weights[part] = 0
-    return weights
-
-
-_Weights = Callable[[Floats], Floats]
-
-
-def _graduated(problem: Problem, state: State, steps: int = STEPS) -> State:
-    """Robust steps: the scale follows the residuals down to their noise."""
-    every = np.ones(problem.count, bool)
-    scale = 3 * _noise(problem, state, every)
-    for _ in range(8):
-        state = _minimise(problem, state, _geman_mcclure(scale), steps, ROUGHLY)
-        before, scale = scale, 3 * _noise(problem, state, every)
-        if scale > 0.9 * before:
-            break
-    return state
-
-
-def _robustly(
-    problem: Problem, state: State, steps: int = STEPS, enough: float = ENOUGH
-) -> tuple[State, Floats]:
-    return _cleaned(problem, _graduated(problem, state, steps), steps, enough)
-
-
-def _cleaned(problem: Problem, state: State, steps: int, enough: float) -> tuple[State, Floats]:
-    """Plain least squares without the points that are too far off, until these stay the same."""
-    weights = _inliers(problem, state, np.ones(problem.count))
-    for _ in range(6):
-        fixed = weights
-        state = _minimise(problem, state, lambda _: fixed, steps, enough)  # noqa: B023
-        weights = _inliers(problem, state, fixed)
-        if np.array_equal(weights, fixed):
-            break
-    return state, fixed
-
-
-def _inliers(problem: Problem, state: State, counted: Floats) -> Floats:
-    """1 for points within `REJECT` times the noise of those that counted before, 0 for others."""
-    limit = REJECT * _noise(problem, state, counted > 0)
-    distance = np.sqrt(_squares(problem.residuals(state)))
-    return _enough(problem, (distance <= limit).astype(float))
-
-
-def _noise(problem: Problem, state: State, counted: Bools) -> float:
-    """Standard deviation per coordinate, pixels, from the median length (Rayleigh: 1.1774 sigma).
-
-    Few points for many unknowns come nearer than their noise; the degrees of freedom make up for
-    that. Never quite 0.
-    """
-    seen, unknowns = 2 * int(counted.sum()), len(state.values) + 6 * len(problem.parts)
-    if not seen:
-        return 1e-6
-    median = float(np.median(np.sqrt(_squares(problem.residuals(state)[counted]))))
-    return max(median / 1.1774 / np.sqrt(max(1 - unknowns / seen, 0.1)), 1e-6)
-
-
-def _squares(residuals: Floats) -> Floats:
-    return np.asarray(np.sum(residuals**2, axis=-1))
-
-
-def _geman_mcclure(scale: float) -> _Weights:
-    return lambda residuals: np.asarray((1 + _squares(residuals) / scale**2) ** -2)
-
-
-def _minimise(
-    problem: Problem, state: State, weights_of: _Weights, steps: int, enough: float = ENOUGH
-) -> State:
-    """Levenberg-Marquardt with weights that follow the residuals."""
-    damping = 1e-3
-    residuals = problem.residuals(state)
-    for _ in range(steps):
-        weights = weights_of(residuals)
-        cost = _cost(problem, state, residuals, weights)
-        equations = Equations.of(problem, state, residuals, weights)
-        if not equations.sound:
-            return state
-        while True:
-            moved, new = _tried(problem, state, equations.step(damping))
-            if new is not None and (new_cost := _cost(problem, moved, new, weights)) < cost:
-                break
-            damping *= 8
-            if damping > 1e10:
-                return state
-        state, residuals, damping = moved, new, max(damping / 6, 1e-12)
-        if cost - new_cost < enough * cost:
-            return state
-    return state
-
-
-def _cost(problem: Problem, state: State, residuals: Floats, weights: Floats) -> float:
-    pulled = problem.pull.cost(state.values) if problem.pull else 0.0
-    return float(weights @ _squares(residuals)) + pulled
-
-
-def _tried(
-    problem: Problem, state: State, step: tuple[Floats, Floats] | None
-) -> tuple[State, Floats | None]:
-    """The state after a step and its residuals; None where the lens is no lens any more."""
-    if step is None:
-        return state, None
-    try:
-        with np.errstate(all="raise", under="ignore"):
-            moved = state.moved(step)
-            residuals = problem.residuals(moved)
-    except (FloatingPointError, ValueError, ProfileError):
-        return state, None
-    return moved, residuals if np.isfinite(residuals).all() else None
+        by_camera, by_shift = both_slopes(self.parameters, state.values, points)
+        return by_camera, np.concatenate([turn_slopes(by_shift, turned), by_shift], axis=-1)
 
 
 @dataclass(frozen=True)
@@ -329,17 +265,11 @@ class Adjusted:
 def adjusted(problem: Problem, state: State) -> Adjusted:
     """The state adjusted robustly, and what is known about it. CalibrationError as in `solve`."""
     with np.errstate(all="ignore"):
-        return _known(problem, *_robustly(problem, state))
+        return _known(problem, *robustly(problem, state))
 
 
 def _known(problem: Problem, state: State, counted: Floats) -> Adjusted:
-    used = sum(bool(counted[part].any()) for part in problem.parts)
-    unknowns = 6 * used + (0 if problem.pull else len(state.values))
-    surplus = float(2 * int(counted.sum()) - unknowns)
-    if surplus < 1:
-        raise CalibrationError(
-            f"{int(counted.sum())} points are too few for {unknowns} unknowns; add views"
-        )
+    surplus = _surplus(problem, state, counted)
     residuals = problem.residuals(state)
     equations = Equations.of(problem, state, residuals, counted)
     if not (equations.sound and np.isfinite(residuals).all()):
@@ -359,7 +289,7 @@ def _known(problem: Problem, state: State, counted: Floats) -> Adjusted:
     inverse = np.linalg.inv(whole)
     if problem.pull:  # values that are only what was expected of them took up no noise
         surplus -= float(np.sum(inverse * each.sum(0)))
-    variance = float(counted @ _squares(residuals)) / surplus
+    variance = float(counted @ squares(residuals)) / surplus
     together = _together(inverse, each, right * scale, variance)
     covariance = together**2 * variance * inverse * np.outer(scale, scale)
     noise = float(np.sqrt(variance))
@@ -385,20 +315,18 @@ def _together(inverse: Floats, each: Floats, right: Floats, variance: float) -> 
     return float(np.sqrt(max(1.0, seen / (variance * own)))) if variance * own > 1e-9 else 1.0
 
 
-def _solution(problem: BoardProblem, state: State, weights: Floats) -> Solution:
-    known = _known(problem, state, weights)
-    return Solution(
-        problem.parameters.camera_of(state.values),
-        state.poses,
-        tuple(known.residuals[part] for part in problem.parts),
-        tuple(known.counted[part] for part in problem.parts),
-        known.covariance,
-        problem.parameters.names,
-        known.condition,
-        known.noise_px,
-        known.together,
-        problem.pull,
-    )
+def _surplus(problem: Problem, state: State, counted: Floats) -> float:
+    """How many more coordinates count than there are unknowns; values that are pulled are none.
+
+    CalibrationError for fewer than one."""
+    used = sum(bool(counted[part].any()) for part in problem.parts)
+    unknowns = 6 * used + (0 if problem.pull else len(state.values))
+    surplus = float(2 * int(counted.sum()) - unknowns)
+    if surplus < 1:
+        raise CalibrationError(
+            f"{int(counted.sum())} points are too few for {unknowns} unknowns; add views"
+        )
+    return surplus
 
 
 UNDETERMINED = (

@@ -14,7 +14,7 @@ import numpy as np
 from ..camera import Camera
 from ..errors import CalibrationError, FreelookError
 from ..lens import Floats, SplinedStereographic
-from .bundle import Solution, resect_all, solve
+from .bundle import Fit, Solution, fit, resect_all, solve
 from .candidates import (
     AUTO,
     Candidate,
@@ -28,6 +28,7 @@ from .doubts import check_enough, check_fit, doubts, typical_uncertainty
 from .field import seen_angle, with_field
 from .free_form import FREE_FORM, Control, check_control
 from .initial import as_kannala_brandt, first_guesses, mirrored, pose_of
+from .minimise import FAR, NEAR
 from .parameters import Freedom
 from .views import Pose, View, checked
 
@@ -134,7 +135,7 @@ def calibrate(
     )
 
 
-def share_counted(solution: Solution) -> float:
+def share_counted(solution: Fit) -> float:
     """The share of points that count."""
     return float(np.mean(np.concatenate(solution.inliers)))
 
@@ -147,7 +148,7 @@ def _base(views: list[View], size: tuple[int, int], freedom: Freedom) -> Solutio
         try:
             start = as_kannala_brandt(guess.camera)
             refined.append(
-                solve(start, guess.poses, few, freedom, steps=RACE_STEPS, enough=RACE_ENOUGH)
+                fit(start, guess.poses, few, freedom, steps=RACE_STEPS, enough=RACE_ENOUGH)
             )
         except FreelookError:
             continue
@@ -156,10 +157,9 @@ def _base(views: list[View], size: tuple[int, int], freedom: Freedom) -> Solutio
             "no lens fits these views; are the board's rows and columns right, and is it flat?"
         )
     best = min(refined, key=lambda s: s.noise_px / share_counted(s))
-    solution = solve(best.camera, best.poses, views, freedom)
-    poses, better = _other_poses(solution, views)
-    if better:
-        solution = solve(solution.camera, poses, views, freedom)
+    rough = fit(best.camera, best.poses, views, freedom, enough=RACE_ENOUGH)
+    poses, better = _other_poses(rough, views)
+    solution = solve(rough.camera, poses, views, freedom, damping=FAR if better else NEAR)
     check_fit(solution)
     return solution
 
@@ -172,7 +172,7 @@ def _even(view: View, most: int) -> View:
     return View(view.name, view.points[chosen], view.pixels[chosen])
 
 
-def _other_poses(solution: Solution, views: list[View]) -> tuple[list[Pose], bool]:
+def _other_poses(solution: Fit, views: list[View]) -> tuple[list[Pose], bool]:
     """For every view the best pose found from some other starts, and whether any is new.
 
     A small flat target looks much the same from its mirrored pose, and a first guess from points

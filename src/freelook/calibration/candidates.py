@@ -28,7 +28,7 @@ from ..camera import Camera, make_camera
 from ..errors import CalibrationError, FreelookError
 from ..fitting.refit import refit
 from ..lens import MODELS, Lens, RadialSpline, growth_limit
-from .bundle import Solution, solve
+from .bundle import Fit, Solution, fit, solve
 from .field import MARGIN, angles, seen_angle, with_field
 from .free_form import (
     FREE_FORM,
@@ -39,6 +39,7 @@ from .free_form import (
     usual_control,
 )
 from .left_out import cross_validate
+from .minimise import ENOUGH, FAR, NEAR, STEPS
 from .nearby import nearby
 from .parameters import HELD, Freedom, lens_names
 from .views import Pose, View
@@ -62,6 +63,9 @@ WORTH_TRYING = 0.02  # of the squared distances, which is 1 % of their root
 OUT_OF_THE_RACE = 1.5  # times the best RMS: what fits so badly need not be tested further
 # Among others a model is given up, after some steps, at so many times the RMS of Kannala-Brandt.
 FAR_OFF, ROUGH_STEPS, ROUGH_ENOUGH = 3.0, 12, 1e-3
+# Relative gain of the last step: before it is known which points count for all, and then, of one
+# among many. Along the valleys of models that say the same twice it may take dozens for nothing.
+NEAR_ENOUGH, AMONG_ENOUGH = 1e-5, 1e-6
 OVERFIT = 1.3  # times the RMS on views left out
 BEYOND = np.radians(0.5)  # of a model's end: more than the first lens may be off there
 FEW_FOLDED = 0.02  # of the points that count
@@ -114,16 +118,21 @@ def tried(
 
     `drop` False: every point counts.
     """
-    alone = []
+    alone: dict[str, Fit | FreelookError] = {}
     for model in models:
         progress(model)
-        alone.append(_alone(model, views, base, freedom, drop, among=len(models)))
-    able = [c.solution for c in alone if c.solution is not None]
+        alone[model] = _alone(model, views, base, freedom, drop, among=len(models))
+    able = [found for found in alone.values() if isinstance(found, Fit)]
     if not able:
-        return alone
+        return [Candidate(model, why_not=str(error)) for model, error in alone.items()]
     counted = min(able, key=_median_px).inliers
     progress("the same points for all")
-    same = [_on_common_points(c, views, base, freedom, counted) for c in alone]
+    same = [
+        _on_common_points(model, found, views, base, freedom, counted, among=len(models))
+        if isinstance(found, Fit)
+        else Candidate(model, why_not=str(found))
+        for model, found in alone.items()
+    ]
     progress("views left out")
     least = np.nanmin([c.rms_px for c in same] + [np.inf])
     return [
@@ -193,30 +202,29 @@ def chosen(candidates: Sequence[Candidate]) -> Candidate:
 
 def _alone(
     model: str, views: Sequence[View], base: Solution, freedom: Freedom, drop: bool, among: int
-) -> Candidate:
+) -> Fit | FreelookError:
     """`among` more than one, a model far off is not solved to the end."""
     try:
         if model == "kannala_brandt" and drop:
-            return Candidate(model, solution=_without_folded(base, views, freedom))
+            return _without_folded(base, views, freedom)
         start = _start(model, base, seen_angle(base, views), freedom)
-        poses = base.poses
-        if drop and among > 1:
-            near = _roughly(start, poses, views, freedom, base.inliers)
-            if _is_far_off(near, base):
-                return Candidate(model, solution=near)
-            start, poses = near.camera, near.poses
-        solution = solve(start, poses, views, freedom, robust=drop)
-        if drop:
-            solution = _without_folded(solution, views, freedom)
-        return Candidate(model, solution=solution)
+        if not drop:
+            return fit(start, base.poses, views, freedom, robust=False)
+        if among == 1:
+            return _without_folded(fit(start, base.poses, views, freedom), views, freedom)
+        near = _roughly(start, base.poses, views, freedom, base.inliers)
+        if _is_far_off(near, base):
+            return near
+        found = fit(near.camera, near.poses, views, freedom, enough=NEAR_ENOUGH, damping=NEAR)
+        return _without_folded(found, views, freedom)
     except FreelookError as error:
-        return Candidate(model, why_not=str(error))
+        return error
 
 
 def _roughly(
     start: Camera, poses: Sequence[Pose], views: Sequence[View], freedom: Freedom, counted: Counted
-) -> Solution:
-    return solve(
+) -> Fit:
+    return fit(
         start,
         poses,
         views,
@@ -228,50 +236,55 @@ def _roughly(
     )
 
 
-def _is_far_off(solution: Solution, base: Solution) -> bool:
-    return solution.rms_px > FAR_OFF * base.rms_px
+def _is_far_off(found: Fit, base: Solution) -> bool:
+    return found.rms_px > FAR_OFF * base.rms_px
 
 
-def _without_folded(solution: Solution, views: Sequence[View], freedom: Freedom) -> Solution:
+def _without_folded(found: Fit, views: Sequence[View], freedom: Freedom) -> Fit:
     """Without the few points that fit only because a lens folds back beyond the others."""
-    limit = growth_limit(solution.camera.lens)
-    if limit >= seen_angle(solution, views):
-        return solution
+    limit = growth_limit(found.camera.lens)
+    if limit >= seen_angle(found, views):
+        return found
     counted = [
         ok & (angles(pose, view) <= limit)
-        for pose, view, ok in zip(solution.poses, views, solution.inliers, strict=True)
+        for pose, view, ok in zip(found.poses, views, found.inliers, strict=True)
     ]
-    before = np.concatenate(solution.inliers).sum()
+    before = np.concatenate(found.inliers).sum()
     if np.concatenate(counted).sum() < (1 - FEW_FOLDED) * before:
-        return solution
-    camera, poses = solution.camera, solution.poses
-    return solve(camera, poses, views, freedom, robust=False, counted=counted)
+        return found
+    return fit(found.camera, found.poses, views, freedom, robust=False, counted=counted)
 
 
 def _on_common_points(
-    candidate: Candidate,
+    model: str,
+    found: Fit,
     views: Sequence[View],
     base: Solution,
     freedom: Freedom,
     counted: Counted,
+    among: int,
 ) -> Candidate:
-    before = candidate.solution
-    if before is None:
-        return candidate
+    far_off = _is_far_off(found, base)
     try:
-        camera, poses = before.camera, before.poses
-        if _is_far_off(before, base):
-            solution = _roughly(camera, poses, views, freedom, counted)
-        else:
-            solution = solve(camera, poses, views, freedom, robust=False, counted=counted)
+        solution = solve(
+            found.camera,
+            found.poses,
+            views,
+            freedom,
+            robust=False,
+            counted=counted,
+            steps=ROUGH_STEPS if far_off else STEPS,
+            enough=ROUGH_ENOUGH if far_off else AMONG_ENOUGH if among > 1 else ENOUGH,
+            damping=FAR if far_off else NEAR,
+        )
         _check_growth(solution.camera.lens, seen_angle(solution, views))
     except FreelookError as error:
-        return Candidate(candidate.model, why_not=str(error))
-    return Candidate(candidate.model, solution.rms_px, solution=solution)
+        return Candidate(model, why_not=str(error))
+    return Candidate(model, solution.rms_px, solution=solution)
 
 
-def _median_px(solution: Solution) -> float:
-    return float(np.median(np.linalg.norm(np.concatenate(solution.residuals), axis=1)))
+def _median_px(found: Fit) -> float:
+    return float(np.median(np.linalg.norm(np.concatenate(found.residuals), axis=1)))
 
 
 def _parameters(candidate: Candidate) -> int:

@@ -9,13 +9,13 @@ import numpy as np
 from ..camera import Camera, make_camera
 from ..errors import CalibrationError, ProfileError
 from ..lens import Floats, growth_limit
-from .bundle import Solution
+from .bundle import Fit
 from .views import Pose, View
 
 MARGIN = np.radians(5.0)  # beyond the outermost point seen
 
 
-def seen_angle(solution: Solution, views: Sequence[View]) -> float:
+def seen_angle(solution: Fit, views: Sequence[View]) -> float:
     """The largest angle from the axis of a point that counts, radians."""
     seen = [
         angles(pose, view)[ok]

@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from ..camera import Camera
 from ..errors import CalibrationError, FreelookError
 from ..lens import Floats
-from .bundle import WORST_CONDITION, BoardProblem, Solution, resect_all, rms, solve
+from .bundle import WORST_CONDITION, BoardProblem, Solution, fit, resect_all, rms
 from .equations import Equations, State
+from .minimise import NEAR
 from .parameters import Freedom
 from .views import View
 
@@ -72,7 +73,7 @@ def predicted_px(
             return float("nan")
         counted = [solution.inliers[i] for i in held_out]
         poses, held = [solution.poses[i] for i in held_out], [views[i] for i in held_out]
-        residuals = resect_all(camera, poses, held, counted)[1]
+        residuals = resect_all(camera, poses, held, counted, enough=ENOUGH, damping=NEAR)[1]
         errors += [r[ok] for r, ok in zip(residuals, counted, strict=True)]
     return rms(np.concatenate(errors))
 
@@ -80,7 +81,7 @@ def predicted_px(
 def _solved_from(
     kept: list[int], solution: Solution, views: Sequence[View], freedom: Freedom
 ) -> Camera:
-    return solve(
+    return fit(
         solution.camera,
         [solution.poses[i] for i in kept],
         [views[i] for i in kept],
@@ -90,6 +91,7 @@ def _solved_from(
         steps=STEPS,
         enough=ENOUGH,
         pull=solution.pull,
+        damping=NEAR,
     ).camera
 
 

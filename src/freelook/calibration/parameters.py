@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..camera import Camera
 from ..lens import (
@@ -13,6 +15,7 @@ from ..lens import (
     Mei,
     OpenCVRational,
     SplinedStereographic,
+    free_fields,
     vector,
     with_vector,
 )
@@ -75,10 +78,10 @@ class Parameters:
     def camera_of(self, values: Floats) -> Camera:
         """The camera with these values instead of its own."""
         free, lens = self.free, self.camera.lens
-        left = list(map(float, values))
         if free.lens:
             count = len(lens_names(lens))
-            lens, left = with_lens_values(lens, np.array(left[:count])), left[count:]
+            lens, values = with_lens_values(lens, values[:count]), values[count:]
+        left = values.tolist()
         center = (left.pop(0), left.pop(0)) if free.center else self.camera.center
         stretch = self.camera.stretch.copy()
         if free.aspect:
@@ -90,37 +93,38 @@ class Parameters:
 
 def lens_names(lens: Lens) -> tuple[str, ...]:
     """Names of what is solved for; entries of lists are numbered, as in radii_px[2]."""
-    return tuple(name for name in _all_names(lens) if name not in HELD.get(type(lens), ()))
+    return _layout(lens)[0]
 
 
 def lens_values(lens: Lens) -> Floats:
     """What is solved for, in the order of `lens_names`."""
-    return vector(lens)[_free(lens)]
+    return vector(lens)[_layout(lens)[1]]
 
 
 def with_lens_values(lens: Lens, values: Floats) -> Lens:
     """The lens with other values; the reverse of `lens_values`."""
     every = vector(lens)
-    every[_free(lens)] = values
+    every[_layout(lens)[1]] = values
     return with_vector(lens, every)
 
 
-def _free(lens: Lens) -> list[int]:
-    held = HELD.get(type(lens), ())
-    return [i for i, name in enumerate(_all_names(lens)) if name not in held]
+def _layout(lens: Lens) -> tuple[tuple[str, ...], NDArray[np.intp]]:
+    """Names of what is solved for, and where these are in a lens's `vector`."""
+    values = [getattr(lens, name) for name in free_fields(type(lens))]
+    return _layout_of(type(lens), tuple(len(v) if isinstance(v, tuple) else None for v in values))
 
 
-def _all_names(lens: Lens) -> list[str]:
+@cache
+def _layout_of(
+    model: type[Lens], counts: tuple[int | None, ...]
+) -> tuple[tuple[str, ...], NDArray[np.intp]]:
+    """`counts` of the entries of those parameters that are lists."""
     names: list[str] = []
-    for field in fields(lens):  # type: ignore[arg-type]
-        value = getattr(lens, field.name)
-        if field.metadata.get("fixed"):
-            continue
-        if isinstance(value, tuple):
-            names += [f"{field.name}[{i}]" for i in range(len(value))]
-        else:
-            names.append(field.name)
-    return names
+    for name, count in zip(free_fields(model), counts, strict=True):
+        names += [name] if count is None else [f"{name}[{i}]" for i in range(count)]
+    held = HELD.get(model, ())
+    free = [i for i, name in enumerate(names) if name not in held]
+    return tuple(names[i] for i in free), np.array(free, np.intp)
 
 
 def difference_step(value: float) -> float:

@@ -20,14 +20,12 @@ import os
 import sys
 from dataclasses import asdict
 from math import isfinite
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import FreelookError
-from . import _pipelines, _predictions
+from . import _calibrations, _pipelines, _predictions
 
 if TYPE_CHECKING:
-    from ..bench.calibrate import Row
     from ..bench.figures import Figure
     from ..bench.render import Timing
 
@@ -122,25 +120,7 @@ def _figures(timing: Timing, ours: Timing) -> dict[str, Any]:
 
 
 def _calibrate(args: argparse.Namespace) -> int:
-    if args.trials is not None:
-        return _trials(args)
-    from ..bench.calibrate import real_sets, run, simulated_sets
-
-    sets = simulated_sets()
-    if args.data:
-        print(f"looking for real sets in {args.data} ...", file=sys.stderr)
-        if not (real := real_sets(Path(args.data))):
-            raise FreelookError(f"{args.data} has neither fish_1/*.jpg nor ov_plane/train/*.orpc")
-        sets = real + sets
-    say = (lambda _: None) if args.json else (lambda what: print(what, file=sys.stderr))
-    rows = list(run(sets, cross_validate=not args.quick, progress=say))
-    if args.json:
-        print(json.dumps([_calibration_figures(row) for row in rows], indent=2))
-    else:
-        _print_calibrations(rows)
-        if not args.data:
-            print("fish_1, ov_plane: skipped: --data FOLDER says where they are")
-    return 0
+    return _trials(args) if args.trials is not None else _calibrations.run(args)
 
 
 def _trials(args: argparse.Namespace) -> int:
@@ -169,45 +149,6 @@ def _trials(args: argparse.Namespace) -> int:
         f"spread of all, in stated standard deviations: {found.spread:.2f}"
     )
     return int(found.failed > 0)
-
-
-def _calibration_figures(row: Row) -> dict[str, Any]:
-    """For JSON, which has no NaN."""
-    figures: dict[str, Any] = {"set": row.set, "way": row.way}
-    for key in ("skipped", "failed"):
-        if said := getattr(row, key):
-            return {**figures, key: said}
-    for key in ("rms_px", "cross_validated_px", "seconds", "cpu_seconds"):
-        value = float(getattr(row, key))
-        figures[key] = value if isfinite(value) else None
-    return figures
-
-
-def _print_calibrations(rows: list[Row]) -> None:
-    from rich.console import Console
-    from rich.table import Table
-
-    for name in dict.fromkeys(row.set for row in rows):
-        table = Table(title=name)
-        table.add_column("way")
-        for column in ("RMS px", "left out px", "seconds", "of CPU"):
-            table.add_column(column, justify="right")
-        for row in rows:
-            if row.set != name:
-                continue
-            if row.skipped or row.failed:
-                said = f"skipped: {row.skipped}" if row.skipped else f"failed: {row.failed}"
-                table.add_row(f"{row.way}\n  {said}", "", "", "", "")
-            else:
-                predicted = row.cross_validated_px
-                held_out = f"{predicted:.3f}" if isfinite(predicted) else ""
-                times = (f"{row.seconds:.2f}", f"{row.cpu_seconds:.2f}")
-                table.add_row(row.way, f"{row.rms_px:.3f}", held_out, *times)
-        Console().print(table)
-    print(
-        "RMS: 2-D, per point, each view with the pose that suits the way's camera best;\n"
-        "left out: the same on views that the way's camera was calibrated without"
-    )
 
 
 def _latency(args: argparse.Namespace) -> int:

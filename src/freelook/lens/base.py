@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import fields, replace
+from functools import cache
 from typing import Protocol, TypeVar, runtime_checkable
 
 import numpy as np
@@ -54,13 +55,13 @@ FIXED = {"fixed": True}
 
 def vector(lens: Lens) -> Floats:
     """What a fit may change, in one row: the parameters that are not fixed, lists spread out."""
-    return np.concatenate([np.ravel(getattr(lens, name)) for name in _free(lens)]).astype(float)
+    return np.hstack([getattr(lens, name) for name in free_fields(type(lens))]).astype(float)
 
 
 def with_vector(lens: T, values: Sequence[float] | Floats) -> T:
     """The same model with other parameters; the reverse of `vector`."""
-    left, changed = list(map(float, values)), {}
-    for name in _free(lens):
+    left, changed = np.asarray(values, np.float64).tolist(), {}
+    for name in free_fields(type(lens)):
         old = getattr(lens, name)
         count = len(old) if isinstance(old, tuple) else 1
         taken, left = left[:count], left[count:]
@@ -68,8 +69,10 @@ def with_vector(lens: T, values: Sequence[float] | Floats) -> T:
     return replace(lens, **changed)  # type: ignore[type-var]
 
 
-def _free(lens: Lens) -> list[str]:
-    return [f.name for f in fields(lens) if not f.metadata.get("fixed")]  # type: ignore[arg-type]
+@cache
+def free_fields(model: type[Lens]) -> tuple[str, ...]:
+    """Names of the parameters that a fit may change, in the model's order."""
+    return tuple(f.name for f in fields(model) if not f.metadata.get("fixed"))  # type: ignore[arg-type]
 
 
 def image_point(lens: Lens, theta: Floats, phi: Floats) -> Floats:
