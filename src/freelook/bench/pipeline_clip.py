@@ -60,7 +60,7 @@ def cut(source: str | Path, target: Path, seconds: float | None = None) -> Clip:
             if not container.streams.video:
                 raise SourceError(f"{source}: there is no video in it")
             stream = container.streams.video[0]
-            rate = Fraction(stream.average_rate or 30).limit_denominator(1001)
+            rate = _rate(stream)
             most = None if seconds is None else max(1, round(seconds * rate))
             packets = list(_packets(container.demux(stream), most))
             _write(target, stream, packets, rate)
@@ -70,6 +70,12 @@ def cut(source: str | Path, target: Path, seconds: float | None = None) -> Clip:
         why = getattr(error, "strerror", None) or "not one picture of it can be decoded"
         raise SourceError(f"{source}: {why}") from None
     return Clip(target, len(packets), float(rate), picture.size, picture.color)
+
+
+def _rate(stream: VideoStream) -> Fraction:
+    """The average one; 30 where odd times make nonsense of it."""
+    rate = Fraction(stream.average_rate or 0).limit_denominator(1001)
+    return rate if 1 <= rate <= 1000 else Fraction(30)
 
 
 def _packets(packets: Iterator[Any], most: int | None) -> Iterator[Any]:
