@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from types import TracebackType
 from typing import TYPE_CHECKING
@@ -23,6 +23,7 @@ from ._stabilising import vehicle_for
 if TYPE_CHECKING:  # slow to load, and may be missing
     from ..ingest import Ingest, IngestStatus
     from ..outputs.group import Outputs
+    from ..outputs.runner import OutputStatus
     from ..outputs.spec import OutputSpec
 
 SCREENS = ("page", "window")
@@ -85,6 +86,22 @@ class FlightLine:
             self._line.show(text)
 
 
+class Shown:
+    """The outputs of a flight, or none."""
+
+    def __init__(self, outputs: Outputs | None = None) -> None:
+        self._outputs = outputs
+
+    def __call__(self) -> str:
+        """How they are, in one line."""
+        return self._outputs.summary() if self._outputs else ""
+
+    def recordings(self) -> list[OutputStatus]:
+        """Of those that are video files."""
+        status = self._outputs.status() if self._outputs else []
+        return [one for one in status if one.name.startswith("file:")]
+
+
 @contextlib.contextmanager
 def shown_outputs(
     args: argparse.Namespace,
@@ -94,13 +111,13 @@ def shown_outputs(
     heads: Mapping[str, Head],
     stabiliser: Stabiliser,
     line: FlightLine,
-) -> Iterator[Callable[[], str]]:
-    """Shows them until the end; yields what says in one line how they are."""
+) -> Iterator[Shown]:
+    """Shows them until the end; yields what says how they are."""
     if not specs:
-        yield str
+        yield Shown()
         return
     with _outputs(args, specs, ingest, camera, heads, stabiliser, line) as outputs:
-        yield outputs.summary
+        yield Shown(outputs)
 
 
 def _outputs(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -12,10 +12,11 @@ from ..camera import Camera
 from ..clock import now_ns
 from ..errors import RenderError
 from ..gimbal import LensLimit
+from ..hud import Link, Recording, Situation
 from ..viewport import Viewport
 from ._arguments import size
 from ._progress import say
-from ._shows import FlightLine, shown_outputs
+from ._shows import FlightLine, Shown, shown_outputs
 from ._signals import asked_to_stop
 from ._stabilising import vehicle_for
 
@@ -25,11 +26,13 @@ if TYPE_CHECKING:
     from ..outputs.spec import OutputSpec
     from ..vehicle import Vehicle
     from ..window.ages import Figures
+    from ..window.overlay import Told
 
 EYES = ("mono", "side-by-side", "top-bottom")
 KEYS = (
     "drag or arrows look, wheel or + and - zoom, R recentres, E eyes front and back, M mode, "
-    "G gives the tracker control again, F full screen, Q or Esc ends"
+    "G gives the tracker control again, I lines on and off, U their colours, F full screen, "
+    "Q or Esc ends"
 )
 
 
@@ -114,36 +117,57 @@ def fly_in_window(
         vehicle.start()
         for head in heads.values():
             head.start()
-        report = _report(ingest, vehicle, heads, line, outputs)
-        outside = Outside(now_ns, opened.enter_context(asked_to_stop()), report)
+        report = Report(ingest, vehicle, heads, line, outputs)
+        outside = Outside(now_ns, opened.enter_context(asked_to_stop()), report.grey, report.told)
         pilot = Pilot(heads, view.hfov_deg, vehicle.stabiliser, args.projection)
         limit = LensLimit(camera) if args.limit == "soft" else None
-        flight = Flight(surface, frames, camera, pilot, outside, optics, args.sampling, limit)
+        flight = Flight(
+            surface, frames, camera, pilot, outside, optics, args.sampling, limit, args.hud
+        )
         opened.callback(lambda: say(summary(flight.figures)))
         flight.run()
 
 
-def _report(
-    ingest: Ingest,
-    vehicle: Vehicle,
-    heads: Mapping[str, Head],
-    line: FlightLine,
-    outputs: Callable[[], str],
-) -> Callable[[int], float]:
-    """Says how the source, the mode and the trackers are; the picture greys while the source is
-    lost."""
+class Report:
+    """How the source, the mode, the trackers and the outputs are: on the terminal's line, and for
+    the HUD."""
 
-    def grey(at_ns: int) -> float:
-        status = ingest.status(at_ns)
-        mode = vehicle.status()
+    def __init__(
+        self,
+        ingest: Ingest,
+        vehicle: Vehicle,
+        heads: Mapping[str, Head],
+        line: FlightLine,
+        outputs: Shown,
+    ) -> None:
+        self._ingest, self._vehicle, self._heads = ingest, vehicle, heads
+        self._line, self._outputs = line, outputs
+
+    def grey(self, at_ns: int) -> float:
+        """Says it; the picture greys while the source is lost."""
+        status, mode = self._ingest.status(at_ns), self._vehicle.status()
         parts = [f"source: {status.state}", status.message, f"mode: {mode.mode}", mode.message]
-        told = [head.status(at_ns) for head in heads.values()]
+        told = [head.status(at_ns) for head in self._heads.values()]
         parts += [f"{one.name} {one.state}: {one.message}" for one in told if one.message]
-        parts.append(outputs())
-        line.show("; ".join(filter(None, parts)))
+        parts.append(self._outputs())
+        self._line.show("; ".join(filter(None, parts)))
         return 1.0 if status.state == "lost" else 0.0
 
-    return grey
+    def told(self, at_ns: int) -> Told:
+        from ..window.overlay import Told
+
+        source, mode = self._ingest.status(at_ns), self._vehicle.status()
+        recordings = self._outputs.recordings()
+        situation = Situation(
+            source_state=source.state,
+            source_message=source.message,
+            mode=mode.mode,
+            mode_trouble=mode.message,
+            broken=tuple(one.message for one in recordings if one.state == "failed"),
+        )
+        shown = [one.counters.get("shown", 0) for one in recordings if one.state == "live"]
+        recording = Recording("live", max(shown)) if shown else None
+        return Told(situation, Link(source.state, source.counters.get("lost", 0)), recording)
 
 
 def summary(figures: Figures) -> str:
@@ -151,5 +175,6 @@ def summary(figures: Figures) -> str:
         return "window: no picture was shown"
     return (
         f"window: {figures.views} views, {figures.rate_hz:.1f} a second, {figures.missed} late; "
-        f"pose to swap: {figures.pose_to_swap}; pose read to swap: {figures.latch_to_swap}"
+        f"pose to swap: {figures.pose_to_swap}; pose read to swap: {figures.latch_to_swap}; "
+        f"video age: {figures.video_age}"
     )

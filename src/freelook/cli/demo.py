@@ -44,7 +44,14 @@ def run(args: argparse.Namespace) -> int:
     args.tracker = args.tracker or [HEAD]
     address = f"rtp://127.0.0.1:{free_port()}"
     about = About(
-        "simulated flight", True, args.hold, args.ease, args.hfov, args.limit, args.projection
+        "simulated flight",
+        True,
+        args.hold,
+        args.ease,
+        args.hfov,
+        args.limit,
+        args.projection,
+        args.hud,
     )
     started_s = time.monotonic()
     fly(

@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING
 from ..camera import Camera
 from ..gimbal import Gimbal, GimbalSettings, Stabiliser
 from ..head import Head
+from ..hud.definition import THEMES
 from ..prediction import make_predictor
 from ..trackers import known_trackers, open_tracker
 from ..viewport import Viewport
@@ -90,6 +91,13 @@ def add_flying_arguments(parser: argparse.ArgumentParser) -> None:
         "--hfov", type=float, default=90.0, metavar="DEG", help="horizontal field of view at start"
     )
     add_projection_argument(parser)
+    parser.add_argument(
+        "--hud",
+        choices=(*THEMES, "off"),
+        default=THEMES[0],
+        help="lines over the picture in page and window: head direction, horizon, dials, warnings; "
+        "the colours to begin with (I switches them off and on, U changes the colours)",
+    )
     add_head_arguments(parser)
     add_mode_arguments(parser)
     add_serving_arguments(parser)
@@ -143,7 +151,14 @@ def run(args: argparse.Namespace) -> int:
         from ..web.station import About
 
         about = About(
-            args.source, False, args.hold, args.ease, args.hfov, args.limit, args.projection
+            args.source,
+            False,
+            args.hold,
+            args.ease,
+            args.hfov,
+            args.limit,
+            args.projection,
+            args.hud,
         )
         fly(args, ingest, camera, about, never, others=others)
     else:
@@ -179,7 +194,9 @@ def fly(
         outputs = opened.enter_context(
             shown_outputs(args, others, ingest, camera, heads, vehicle.stabiliser, line)
         )
-        station = Station(ingest, camera, heads, about, vehicle=vehicle)
+        station = Station(
+            ingest, camera, heads, about, vehicle=vehicle, recordings=outputs.recordings
+        )
         serving = serve(
             make_app(station, door.guard),
             door,

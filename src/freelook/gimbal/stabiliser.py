@@ -151,6 +151,11 @@ class Stabiliser:
                 self._asked = (now_ns, capture_ns)
             return self._newest
 
+    def attitude_at(self, capture_ns: int) -> Rotation | None:
+        """`world_from_body` when a frame was taken; None where it is not known. In any mode."""
+        with self._lock:
+            return self._buffer.at(capture_ns + self._offset_ns)
+
     def _answer(self, now_ns: int, capture_ns: int) -> Base:
         t_ns = capture_ns + self._offset_ns
         attitude = self._buffer.at(t_ns)

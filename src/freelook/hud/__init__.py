@@ -4,6 +4,7 @@
 shapes of the same numbers (web/static/hud.js). `pen.glsl` draws them in both.
 """
 
+from .conditions import Situation, conditions
 from .definition import THEMES, Definition, Theme, definition, theme_named
 from .place import Place, place_of
 from .shapes import Box, Lines, Shape, Text, shapes
@@ -21,10 +22,12 @@ __all__ = [
     "Place",
     "Recording",
     "Shape",
+    "Situation",
     "Text",
     "Theme",
     "TrackerState",
     "Warned",
+    "conditions",
     "definition",
     "place_of",
     "shapes",

@@ -25,7 +25,8 @@ class Rect:
 @dataclass(frozen=True)
 class Place:
     """A view of width x height points, (0, 0) its top left corner; where the tape goes; from
-    where down there is room at the sides and in the middle; the parts that are drawn."""
+    where down there is room at the sides and in the middle; the parts that are drawn; what is
+    left free on each side, across and down."""
 
     width: float
     height: float
@@ -33,6 +34,7 @@ class Place:
     sides_y: float
     middle_y: float
     parts: tuple[str, ...] = ALL
+    inset: tuple[float, float] = (0.0, 0.0)
 
 
 def pixels_per_point(size: tuple[int, int]) -> float:
@@ -40,17 +42,23 @@ def pixels_per_point(size: tuple[int, int]) -> float:
     return min(max(min(size) / POINTS_HIGH, 1.0), MOST_PER_POINT)
 
 
-def place_of(width: float, height: float, parts: tuple[str, ...] = ALL) -> Place:
+def place_of(
+    width: float,
+    height: float,
+    parts: tuple[str, ...] = ALL,
+    inset: tuple[float, float] = (0.0, 0.0),
+) -> Place:
     """With nothing else on the view."""
     known = definition()
     tape, margin = known["tape"], known.margin
-    narrow = width < tape["narrow"]
-    wanted = width - 2 * margin if narrow else width * tape["share"]
-    across = min(tape["most"], max(wanted, min(tape["least"], width - 2 * margin)))
-    rect = Rect((width - across) / 2, tape["top"], across, tape["height"])
+    free = width - 2 * inset[0]
+    narrow = free < tape["narrow"]
+    wanted = free - 2 * margin if narrow else free * tape["share"]
+    across = min(tape["most"], max(wanted, min(tape["least"], free - 2 * margin)))
+    rect = Rect((width - across) / 2, tape["top"] + inset[1], across, tape["height"])
     below = rect.y + rect.height
-    sides_y = below if narrow else 0.0
+    sides_y = below if narrow else inset[1]
     # the tallest at the sides is the state
     sides = margin + known["state"]["most"] * known["state"]["line"] - known["warnings"]["gap"] / 2
     taken = below + sides if narrow else below
-    return Place(width, height, rect, sides_y, taken, parts)
+    return Place(width, height, rect, sides_y, taken, parts, inset)

@@ -220,8 +220,9 @@ def _field(scene: Scene) -> Shapes:
     lens, known = scene.state.lens, definition()
     look, margin = known["field"], known.margin
     radius = look["radius"]
-    x, y = margin + radius, scene.place.height - margin - radius
-    text_x = margin
+    left, bottom = scene.place.inset[0] + margin, scene.place.height - scene.place.inset[1] - margin
+    x, y = left + radius, bottom - radius
+    text_x = left
     if lens is not None:
         turn = np.linspace(0, 2 * np.pi, 37)
         ring = np.stack([x + radius * np.cos(turn), y + radius * np.sin(turn)], axis=-1)
@@ -231,7 +232,7 @@ def _field(scene: Scene) -> Shapes:
         if not scene.kind.cut:
             border = _on_ring(scene, lens, x, y, radius)
             yield Lines(scene.path(border), look["width"] + 0.5, "chosen")
-        text_x = margin + 2 * radius + 10
+        text_x = left + 2 * radius + 10
     text = f"{whole(scene.state.hfov_deg)}°"
     yield Text(text, text_x, y, look["text"], "bright", "left")
 
@@ -252,7 +253,7 @@ def _on_ring(scene: Scene, lens: LensField, x: float, y: float, radius: float) -
 def _state(scene: Scene) -> Shapes:
     """Link, tracker, mode, recording."""
     known, state = definition(), scene.state
-    look, x = known["state"], known.margin
+    look, x = known["state"], known.margin + scene.place.inset[0]
     y = scene.place.sides_y + known.margin + look["line"] / 2
     for text in _state_lines(scene):
         yield Text(capitals(text), x, y, look["text"], anchor="left")
@@ -283,7 +284,8 @@ def _dials(scene: Scene) -> Shapes:
     known = definition()
     look, radius = known["dials"], known["dials"]["radius"]
     y = scene.place.sides_y + known.margin + radius + 2
-    x = scene.place.width - known.margin - radius - (len(look["full_ms"]) - 1) * look["step"]
+    right = scene.place.width - scene.place.inset[0] - known.margin
+    x = right - radius - (len(look["full_ms"]) - 1) * look["step"]
     for name, full_ms in look["full_ms"].items():
         dial = scene.state.dials.get(name)
         if dial is not None:

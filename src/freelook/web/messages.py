@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from scipy.spatial.transform import Rotation
 
@@ -17,6 +17,9 @@ from ..rotations import FRD_FROM_RDF, RDF_FROM_FRD, to_wxyz
 from ..session import camera_from_head
 from ..types import Counters
 from ..vehicle import VehicleStatus
+
+if TYPE_CHECKING:
+    from ..outputs.runner import OutputStatus
 
 LONGEST_MESSAGE = 1000
 NS_PER_MS = 1e6
@@ -63,11 +66,16 @@ def pose(tracker: str, aim: Aim, now_ns: int) -> str:
     return text(message)
 
 
-def frame(rtp: int, capture_ns: int, base: Base = BODY) -> str:
-    """When a frame came, and the base in which heads turn while it is shown; none in body mode."""
+def frame(
+    rtp: int, capture_ns: int, base: Base = BODY, world_from_body: Rotation | None = None
+) -> str:
+    """When a frame came, and the base in which heads turn while it is shown; none in body mode.
+    Also the vehicle's attitude then, where that is known: in head axes, north ahead."""
     message: dict[str, Any] = {"type": "frame", "rtp": rtp, "arrival": capture_ns}
     if base.turned:
         message["base"] = _in_head_axes(base.body_from_base)
+    if world_from_body is not None:
+        message["world"] = _in_head_axes(world_from_body)
     return text(message)
 
 
@@ -82,12 +90,14 @@ def status(
     trackers: Iterable[HeadStatus],
     viewers: int,
     vehicle: VehicleStatus | None = None,
+    recordings: Iterable[dict[str, Any]] = (),
 ) -> dict[str, Any]:
     message: dict[str, Any] = {
         "type": "status",
         "source": source,
         "trackers": [_tracker(tracker) for tracker in trackers],
         "viewers": viewers,
+        "recordings": list(recordings),
     }
     if vehicle is not None:
         message["vehicle"] = {
@@ -100,6 +110,16 @@ def status(
             "offset": vehicle.offset,
         }
     return message
+
+
+def recording(output: OutputStatus) -> dict[str, Any]:
+    """A video file that is being written, or was."""
+    return {
+        "name": output.name,
+        "state": output.state,
+        "message": output.message,
+        "shown": output.counters.get("shown", 0),
+    }
 
 
 def source_status(

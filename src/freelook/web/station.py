@@ -7,16 +7,17 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from ..camera import Camera
 from ..clock import Clock, now_ns
 from ..gimbal import MODES, Aim, GimbalSettings, Stabiliser
 from ..head import Head
+from ..hud.definition import THEMES
 from ..ingest import Ingest
 from ..session import same_shape
 from ..vehicle import Vehicle
@@ -24,6 +25,9 @@ from . import messages
 from .feed import Feed
 from .units import Hub
 from .whep import Viewer, Viewers
+
+if TYPE_CHECKING:
+    from ..outputs.runner import OutputStatus
 
 TICK_S = 1 / 30
 TICKS_PER_STATUS = 7
@@ -41,6 +45,7 @@ class About:
     hfov_deg: float = 90.0
     limit: str = "black"
     projection: str = "perspective"
+    hud: str = THEMES[0]
 
 
 class UnknownName(LookupError):  # noqa: N818 - an answer, not a failure
@@ -60,6 +65,7 @@ class Station:
         vehicle: Vehicle | None = None,
         most_viewers: int = 16,
         clock: Clock = now_ns,
+        recordings: Callable[[], Sequence[OutputStatus]] = tuple,
     ) -> None:
         self.viewers: Viewers
         self._ingest = ingest
@@ -69,6 +75,7 @@ class Station:
         self._vehicle = Vehicle(Stabiliser()) if vehicle is None else vehicle
         self._most_viewers = most_viewers
         self._clock = clock
+        self._recordings = recordings
         self._pose_pending = dict.fromkeys(self._heads, False)
         self._missed = dict.fromkeys(self._heads, False)
         self._states: dict[str, str] = {}
@@ -110,6 +117,7 @@ class Station:
             "hfov_deg": self._about.hfov_deg,
             "limit": self._about.limit,
             "projection": self._about.projection,
+            "hud": self._about.hud,
             "modes": list(MODES),
             "rate_deg_s": GimbalSettings().rate_deg_s,
             "zoom": messages.zoom(self._camera),
@@ -146,7 +154,10 @@ class Station:
         )
         source = messages.source_status(ingest, self._feed.why, trouble, counters)
         trackers = [head.status(now) for head in self._heads.values()]
-        return messages.status(source, trackers, len(self.viewers), self._vehicle.status())
+        recordings = [messages.recording(one) for one in self._recordings()]
+        return messages.status(
+            source, trackers, len(self.viewers), self._vehicle.status(), recordings
+        )
 
     # --- what viewers tell us
 
@@ -164,7 +175,8 @@ class Station:
 
     def frame_sent(self, viewer: Viewer, rtp: int, capture_ns: int) -> None:
         base = self._vehicle.stabiliser.at(self._clock(), capture_ns)
-        viewer.send(messages.frame(rtp, capture_ns, base))
+        world = self._vehicle.stabiliser.attitude_at(capture_ns)
+        viewer.send(messages.frame(rtp, capture_ns, base, world))
 
     def wants_key(self, viewer: Viewer) -> bool:
         return self._feed.request_key()

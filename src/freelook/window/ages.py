@@ -39,11 +39,13 @@ class Figures:
     pose_to_swap   from when a pose was measured (or a hand moved) to when the screen took its view;
                    each pose once, with the first view that shows it
     latch_to_swap  from when the pose was read to then
+    video_age      from when a frame came to when the screen took its first view
     missed         views that were begun in time and came a screen's period late
     """
 
     pose_to_swap: Ages = field(default_factory=Ages)
     latch_to_swap: Ages = field(default_factory=Ages)
+    video_age: Ages = field(default_factory=Ages)
     views: int = 0
     missed: int = 0
     first_ns: int = 0

@@ -1,27 +1,30 @@
 """The loop of a flight in a window: the newest frame, the pose read as late as possible, swap.
 
 wait until the screen's next picture is nearly due -> take the newest frame to the GPU ->
-read the pose -> draw -> swap, which waits for the screen -> note how old the pose was
+read the pose -> draw, the HUD too -> swap, which waits for the screen -> note how old the pose was
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from scipy.spatial.transform import Rotation
 
 from ..camera import Camera
 from ..clock import NS_PER_S, Clock
 from ..errors import SinkError
-from ..gimbal import LensLimit
+from ..gimbal import CENTRE, LensLimit
+from ..hud import HudState, LensField, definition
 from ..mailbox import Mailbox
 from ..renderers.blank import Sampling
+from ..rotations import angle_between_deg
 from ..session import same_shape
 from ..types import Frame
 from .ages import Figures
 from .events import Event
 from .eyes import Optics, eyes
+from .overlay import Overlay, Told
 from .pacing import Pacer, period_ns
 from .painting import EyesPainter
 from .pilot import Pilot
@@ -36,15 +39,17 @@ AFTER_DAMAGE = 3
 @dataclass(frozen=True)
 class Outside:
     """What the loop asks of the world: the clock, whether to stop, how far the video is lost
-    (0 live, 1 lost)."""
+    (0 live, 1 lost), and what there is to tell the pilot."""
 
     clock: Clock
     stop: Callable[[], bool]
     grey: Callable[[int], float] = lambda _now_ns: 0.0
+    told: Callable[[int], Told] = lambda _now_ns: Told()
 
 
 class Flight:
-    """Shows `frames` on `surface`, turned by `pilot`; with `limit` never past the lens."""
+    """Shows `frames` on `surface`, turned by `pilot`; with `limit` never past the lens. `hud` is
+    the theme of the lines over it, or "off"."""
 
     def __init__(
         self,
@@ -56,6 +61,7 @@ class Flight:
         optics: Optics | None = None,
         sampling: Sampling = "bilinear",
         limit: LensLimit | None = None,
+        hud: str = "off",
     ) -> None:
         self.figures = Figures()
         self._surface = surface
@@ -66,6 +72,10 @@ class Flight:
         self._outside = outside
         self._optics = Optics() if optics is None else optics
         self._painter = EyesPainter(surface.context, self._optics, sampling, pilot.projection)
+        self._overlay = Overlay(surface.context, self._optics, hud)
+        self._lens = LensField.of(camera)
+        self._held_deg = 0.0
+        self._fresh_ns: int | None = None
         self._pacer = Pacer(period_ns(surface.refresh_hz))
         self._frame: Frame | None = None
         self._shown: tuple[object, ...] = ()
@@ -108,6 +118,10 @@ class Flight:
                 self._ending = True
             elif asked == "draw again":
                 self._redraw = AFTER_DAMAGE
+            elif asked == "lines":
+                self._overlay.toggle()
+            elif asked == "theme":
+                self._overlay.next_theme()
             else:
                 self._surface.toggle_full_screen()
                 self._pacer = Pacer(period_ns(self._surface.refresh_hz), self._pacer.missed)
@@ -123,6 +137,9 @@ class Flight:
         camera, hfov_deg = self._camera_for(frame), self._pilot.hfov_deg
         if fresh:
             self._painter.load(frame.picture, camera, size, hfov_deg)
+            self._fresh_ns = begun_ns
+        if self._overlay.is_due(begun_ns):
+            self._overlay.rest(self._told(begun_ns), self._hud_of(frame), size, begun_ns)
         self._handle(self._surface.events())
         latched_ns = self._outside.clock()
         self._pilot.advance(latched_ns, self._surface.pad())
@@ -131,7 +148,9 @@ class Flight:
         if self._limit is not None:
             viewport = self._painter.viewport(size, hfov_deg)
             body_from_view = self._limit(body_from_view, viewport, latched_ns)
-        shown = (id(frame), size, hfov_deg, grey, tuple(body_from_view.as_quat()))
+            self._held_deg = angle_between_deg(look.body_from_view, body_from_view)
+        turn, version = tuple(body_from_view.as_quat()), self._overlay.version
+        shown = (id(frame), size, hfov_deg, grey, version, turn)
         if shown == self._shown and not self._redraw:
             return False
         self._redraw = max(0, self._redraw - 1)
@@ -142,6 +161,9 @@ class Flight:
         swapped_ns = self._outside.clock()
         self._shown = shown
         self._note(begun_ns, latched_ns, drawn_ns, swapped_ns, look.pose_ns)
+        if fresh:
+            self.figures.video_age.add(swapped_ns - frame.capture_ns)
+            self._overlay.video_ages.add(swapped_ns, swapped_ns - frame.capture_ns)
         return True
 
     def _draw(
@@ -156,6 +178,9 @@ class Flight:
         camera_from_view = camera.camera_from_body * body_from_view
         self._painter.load(frame.picture, camera, size, hfov_deg)  # again only after a zoom
         self._painter.paint(self._surface.screen, size, camera, camera_from_view, hfov_deg, grey)
+        state = self._hud_of(frame, body_from_view, hfov_deg)
+        focal_px = self._painter.viewport(size, hfov_deg).focal_px
+        self._overlay.draw(state, size, self._surface.screen, focal_px)
         self._surface.context.finish()
 
     def _note(
@@ -169,7 +194,35 @@ class Flight:
         figures.latch_to_swap.add(swapped_ns - latched_ns)
         if pose_ns is not None and pose_ns != self._shown_pose_ns:
             figures.pose_to_swap.add(swapped_ns - pose_ns)
+            self._overlay.head_ages.add(swapped_ns, swapped_ns - pose_ns)
             self._shown_pose_ns = pose_ns
+
+    def _hud_of(
+        self, frame: Frame, body_from_view: Rotation = CENTRE, hfov_deg: float = 90.0
+    ) -> HudState:
+        return HudState(
+            body_from_view,
+            hfov_deg,
+            self._pilot.projection,
+            self._pilot.attitude(frame.capture_ns),
+            self._lens,
+        )
+
+    def _told(self, now_ns: int) -> Told:
+        """What others know, and what is known here."""
+        told = self._outside.told(now_ns)
+        name, state, age_ms = self._pilot.command(now_ns)
+        since_ns = None if self._fresh_ns is None else now_ns - self._fresh_ns
+        situation = replace(
+            told.situation,
+            video_age_s=None if since_ns is None else since_ns / NS_PER_S,
+            head=name,
+            head_state=state,
+            head_age_ms=age_ms,
+            limited=self._held_deg > definition()["warnings"]["limit_deg"],
+            keys="E",
+        )
+        return replace(told, situation=situation)
 
     def _grey_at(self, now_ns: int) -> float:
         if now_ns - self._grey_ns >= STATUS_S * NS_PER_S:

@@ -34,6 +34,7 @@ STEEP = 0.2  # near straight up or down a drag turns yaw no faster than 1 / STEE
 
 LOOKS = {"left": (-1, 0), "right": (1, 0), "up": (0, 1), "down": (0, -1)}
 ZOOMS = {"+": -1, "-": 1}
+OTHERS = {"f": ["full screen"], "i": ["lines"], "u": ["theme"], "q": ["quit"], "escape": ["quit"]}
 
 
 @dataclass(frozen=True)
@@ -81,9 +82,22 @@ class Pilot:
         hand = body_from_view(self._yaw_deg, self._pitch_deg)
         return Look(self._back.left(now_ns) * base.body_from_base * hand, self._hand_ns)
 
+    def command(self, now_ns: int) -> tuple[str, str, float | None]:
+        """Who is in command ("hand": mouse, keys or gamepad), the state of its aim, and for a
+        tracker how many milliseconds ago its newest pose was measured."""
+        if self._head is None:
+            return "hand", "tracking" if self._enabled else "front", None
+        status = self._head.status(now_ns)
+        age_ms = None if status.age_ns is None else status.age_ns / 1e6
+        return status.name, status.state, age_ms
+
+    def attitude(self, capture_ns: int) -> Rotation | None:
+        """The vehicle's, `world_from_body`, when a frame was taken; None where not known."""
+        return self._stabiliser.attitude_at(capture_ns)
+
     def take(self, events: Iterable[Event], now_ns: int, size: tuple[int, int]) -> list[str]:
-        """Turn, zoom, recentre; returns what is for others to do: "full screen", "draw again",
-        "quit".
+        """Turn, zoom, recentre; returns what is for others to do: "full screen", "lines",
+        "theme", "draw again", "quit".
 
         `size` is that of an eye's view in window pixels.
         """
@@ -174,7 +188,7 @@ class Pilot:
             self.next_mode()
         elif key.name == "g":
             self.give_back()
-        return {"f": ["full screen"], "q": ["quit"], "escape": ["quit"]}.get(key.name, [])
+        return OTHERS.get(key.name, [])
 
     def _drag(self, drag: Drag, now_ns: int, size: tuple[int, int]) -> None:
         """The picture follows the mouse; exactly so in the middle of the view."""

@@ -31,7 +31,10 @@ export function actionsOf(app) {
     full: toggleFullScreen,
     instruments: () => settings.set('instruments', !settings.get('instruments')),
     theme: () => nextTheme(app),
-    panels: () => settings.set('panels', !settings.get('panels')),
+    panels: () => {
+      settings.set('panels', !settings.get('panels'));
+      togglePanel('', false);
+    },
     settings: () => togglePanel('settings'),
     help: () => togglePanel('help'),
     close: () => togglePanel('', false),

@@ -26,8 +26,8 @@ import { focalPx } from './viewport.js';
  */
 /**
  * @typedef {{width: number, height: number, tape: Rect, sidesY: number, middleY: number,
- *   parts: string[]}} Place where the tape goes; from where down there is room at the sides and in
- * the middle
+ *   parts: string[], inset: number[]}} Place where the tape goes; from where down there is room at
+ * the sides and in the middle; what is left free on each side, across and down
  */
 /** @typedef {{kind: 'lines', pieces: Piece[], width: number, role: string, opacity: number}
  *   | {kind: 'box', rect: Rect, role: string, opacity: number}
@@ -48,18 +48,21 @@ export const MOVING = ['horizon', 'edge', 'tape', 'field'];
 export const RESTING = ['state', 'dials', 'warnings'];
 
 /** With nothing else on the view. @param {Definition} known @param {number} width
- * @param {number} height @param {string[]} [parts] @returns {Place} */
-export function placeOn(known, width, height, parts = [...MOVING, ...RESTING]) {
+ * @param {number} height @param {string[]} [parts] @param {number[]} [inset] @returns {Place} */
+export function placeOn(known, width, height, parts = [...MOVING, ...RESTING], inset = [0, 0]) {
   const { tape, margin, state } = known;
-  const narrow = width < tape.narrow;
-  const wanted = narrow ? width - 2 * margin : width * tape.share;
-  const across = min(tape.most, max(wanted, min(tape.least, width - 2 * margin)));
-  const rect = { x: (width - across) / 2, y: tape.top, width: across, height: tape.height };
+  const free = width - 2 * inset[0];
+  const narrow = free < tape.narrow;
+  const wanted = narrow ? free - 2 * margin : free * tape.share;
+  const across = min(tape.most, max(wanted, min(tape.least, free - 2 * margin)));
+  const rect = {
+    x: (width - across) / 2, y: tape.top + inset[1], width: across, height: tape.height,
+  };
   const below = rect.y + rect.height;
   return {
-    width, height, tape: rect, sidesY: narrow ? below : 0,
+    width, height, tape: rect, sidesY: narrow ? below : inset[1],
     middleY: narrow ? below + margin + state.most * state.line - known.warnings.gap / 2 : below,
-    parts,
+    parts, inset,
   };
 }
 
@@ -275,10 +278,11 @@ function caret({ known: { tape: look }, place: { tape: place }, levelFromHead },
 function field(scene) {
   const { known: { field: look, margin }, state: { lens, hfovDeg }, place } = scene;
   const { radius } = look;
-  const [x, y] = [margin + radius, place.height - margin - radius];
+  const start = place.inset[0] + margin;
+  const [x, y] = [start + radius, place.height - place.inset[1] - margin - radius];
   const words = (/** @type {number} */ left) =>
     text(`${whole(hfovDeg)}°`, left, y, look.text, 'bright', 'left');
-  if (!lens) return [words(margin)];
+  if (!lens) return [words(start)];
   const ring = range(0, 36, 1).map((i) => /** @type {Point} */ (
     [x + radius * cos((i * PI) / 18), y + radius * sin((i * PI) / 18)]));
   /** @type {Piece[]} */
@@ -286,7 +290,7 @@ function field(scene) {
   const view = scene.cut ? []
     : [lines(path(scene, onRing(scene, lens, x, y)), look.width + 0.5, 'chosen')];
   return [lines([...path(scene, ring), ...cross], look.width), ...view,
-    words(margin + 2 * radius + 10)];
+    words(start + 2 * radius + 10)];
 }
 
 /** The view's border, as far from the middle as its directions are from the lens's axis.
@@ -313,7 +317,8 @@ function onRing(scene, lens, x, y) {
 
 /** Link, tracker, mode, recording. @param {Scene} scene @returns {Shape[]} */
 function stateLines({ known, state, place }) {
-  const { state: look, margin: x } = known;
+  const look = known.state;
+  const x = known.margin + place.inset[0];
   const start = place.sidesY + known.margin + look.line / 2;
   const { link, tracker, mode = 'body', recording } = state;
   const told = [];
@@ -337,7 +342,7 @@ function dials({ known, state, place }) {
   const { dials: look, margin } = known;
   const y = place.sidesY + margin + look.radius + 2;
   const names = Object.keys(look.full_ms);
-  const first = place.width - margin - look.radius - (names.length - 1) * look.step;
+  const first = place.width - place.inset[0] - margin - look.radius - (names.length - 1) * look.step;
   return names.flatMap((name, i) => {
     const dial = state.dials?.[name];
     return dial ? dialShapes(known, name, dial, first + i * look.step, y) : [];

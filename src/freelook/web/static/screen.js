@@ -101,11 +101,11 @@ export class Screen {
       const { hfovDeg } = this.viewOn(forward);
       renderer.drawView(scaled(forward, ratio), IDENTITY, hfovDeg, projection);
     }
-    if (fisheye) this.drawFisheye(fisheye, view, q);
     renderer.pen.begin(ratio, values.hud);
     if (values.instruments) this.drawHud(main, view, q, fisheye);
     if (forward) renderer.pen.draw(caption('STRAIGHT AHEAD', forward), forward);
     renderer.pen.end();
+    if (fisheye) this.drawFisheye(fisheye, view, q);
     instruments.showField(view.hfovDeg);
   }
 
