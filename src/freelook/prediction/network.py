@@ -1,6 +1,6 @@
 """A few small networks whose answers are averaged; weights in `head_motion.npz` beside this file.
 
-They were trained by `scripts/train-prediction`, which says how. In NumPy a call takes some tens of
+They were trained by `scripts/train_prediction.py`, which says how. In NumPy a call takes some tens of
 microseconds.
 """
 
