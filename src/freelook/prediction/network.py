@@ -1,7 +1,7 @@
 """A few small networks whose answers are averaged; weights in `head_motion.npz` beside this file.
 
-They were trained by `scripts/train_prediction.py`, which says how. In NumPy a call takes some tens of
-microseconds.
+They were trained by `scripts/train_prediction.py`, which says how. In NumPy a call takes some tens
+of microseconds.
 """
 
 from __future__ import annotations
