@@ -25,10 +25,11 @@ from ..camera import Camera
 from ..errors import CalibrationError
 from ..lens import Floats, SplinedStereographic, growth_limit, image_point, radius_slope
 from ._surface import ORDER, Surface, stereographic
-from .bundle import BoardProblem, Solution, solve
+from .bundle import BoardProblem, Solution, fit, solve
 from .equations import Equations, Pull, State
 from .field import MARGIN, seen_angle
 from .left_out import FOLDS, camera_without, predicted_px
+from .minimise import NEAR
 from .parameters import Freedom
 from .views import View
 
@@ -54,8 +55,6 @@ def free_form(
     views: Sequence[View],
     counted: Counted | None = None,
     control: Control | None = None,
-    *,
-    enough: float = ENOUGH,
 ) -> Solution:
     """A splined camera adjusted to the points that are true in `counted` ((n,) of each view; None:
     those that count in `start`), pulled towards the camera of `start`.
@@ -74,8 +73,9 @@ def free_form(
         robust=False,
         counted=counted,
         steps=STEPS,
-        enough=enough,
+        enough=ENOUGH,
         pull=pull,
+        damping=NEAR,
     )
 
 
@@ -95,7 +95,19 @@ def free_form_predicts_px(
             residuals=tuple(start.residuals[i] for i in kept),
             inliers=tuple(start.inliers[i] for i in kept),
         )
-        return free_form(rest, [views[i] for i in kept], None, control, enough=ROUGHLY).camera
+        some = [views[i] for i in kept]
+        camera, pull = pulled_to(rest, some, control)
+        return fit(
+            camera,
+            rest.poses,
+            some,
+            robust=False,
+            counted=rest.inliers,
+            steps=STEPS,
+            enough=ROUGHLY,
+            pull=pull,
+            damping=NEAR,
+        ).camera
 
     return predicted_px(start, views, camera_of)
 
