@@ -7,6 +7,8 @@ installed is named as skipped.
   freelook bench render --threads 1      on one core
   freelook bench pipeline                whole reframes, beside ffmpeg and OpenCV
   freelook bench latency                 needs a browser; takes about a minute
+  freelook bench streams                 what ffmpeg, GStreamer, VLC and Chromium receive
+  freelook bench soak --minutes 10       memory, with receivers that stall and vanish
   freelook bench calibrate --data FOLDER beside OpenCV and mrcal; mrcal takes minutes
   freelook bench calibrate --trials 200  random lenses instead: does it ever fail?
   freelook bench predict FILE ...        where heads are predicted to look, on recorded motion
@@ -23,7 +25,7 @@ from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 from ..errors import FreelookError
-from . import _calibrations, _pipelines, _predictions
+from . import _calibrations, _pipelines, _predictions, _stream_benches
 
 if TYPE_CHECKING:
     from ..bench.figures import Figure
@@ -46,6 +48,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     latency.add_argument("--seconds", type=float, default=10.0, metavar="S", help="for each part")
     latency.add_argument("--json", action="store_true", help="print the figures as JSON")
     latency.set_defaults(bench=_latency)
+    streams = what.add_parser("streams", help="what other programs receive, how soon, how late")
+    _stream_benches.add_streams_arguments(streams)
+    soak = what.add_parser("soak", help="a flight's memory, with receivers that stall and vanish")
+    _stream_benches.add_soak_arguments(soak)
     calibrate = what.add_parser("calibrate", help="lenses from corners, beside OpenCV and mrcal")
     calibrate.add_argument(
         "--data", metavar="FOLDER", help="with the real sets fish_1 and ov_plane, if you have them"
