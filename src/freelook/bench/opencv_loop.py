@@ -34,6 +34,7 @@ def run(job: dict[str, Any]) -> None:
         coded: Any = target.add_stream("libx264", rate=Fraction(job["fps"]).limit_denominator(1001))
         coded.width, coded.height, coded.pix_fmt = width, height, "yuv420p"
         coded.codec_context.gop_size = job["key_interval"]
+        coded.codec_context.thread_type = "AUTO"
         coded.codec_context.color_range = range_
         coded.options = job["options"]
         for index, frame in enumerate(source.decode(video)):

@@ -41,7 +41,8 @@ EXTRA_OF = {
 }
 
 
-def make_parser() -> argparse.ArgumentParser:
+def make_parser(names: Sequence[str] = COMMANDS) -> argparse.ArgumentParser:
+    """For these commands; what they import takes time, all of them half a second."""
     parser = argparse.ArgumentParser(
         prog="freelook",
         description="A gimbal with no moving parts: look around in a live fisheye video.",
@@ -49,7 +50,7 @@ def make_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"freelook {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    for name in COMMANDS:
+    for name in names:
         module = import_module(f".{name.replace(' ', '_')}", __name__)
         assert module.__doc__
         summary = module.__doc__.strip().splitlines()[0]
@@ -68,7 +69,8 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """The arguments, understood; commands of two words are joined to the one name they have."""
     two = " ".join(arguments[:2])
     joined = [two, *arguments[2:]] if two in COMMANDS else arguments
-    return make_parser().parse_args(joined)
+    named = [name for name in joined[:1] if name in COMMANDS]
+    return make_parser(named or COMMANDS).parse_args(joined)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

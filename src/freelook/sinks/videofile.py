@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import av
+from av.codec.context import ThreadType
 from av.container import InputContainer, OutputContainer
 from av.error import FFmpegError
 from av.stream import Stream
@@ -26,8 +27,10 @@ TICKS_PER_S = 90_000
 KEY_INTERVAL_S = 1.0
 QUALITY = {"h264": "18", "hevc": "20"}  # constant rate factor: hard to tell from the original
 PRESET = {"h264": "veryfast", "hevc": "ultrafast"}
-PRESETS = ("ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower")
-PRESETS += ("veryslow",)
+PRESETS = (
+    *("ultrafast", "superfast", "veryfast", "faster", "fast"),
+    *("medium", "slow", "slower", "veryslow"),
+)
 # Self-contained pieces: whatever was written plays, however the program ended. The header waits
 # for the first piece, so that it can say when the pictures start after the sound.
 FRAGMENTED = {
@@ -191,6 +194,8 @@ def _add_video(container: OutputContainer, settings: SinkSettings) -> VideoStrea
     stream.pix_fmt = "yuv420p"
     stream.time_base = stream.codec_context.time_base = Fraction(1, TICKS_PER_S)
     stream.codec_context.gop_size = max(1, round(KEY_INTERVAL_S * settings.fps))
+    # whole frames beside each other, not slices of one: faster, and smaller at the same quality
+    stream.codec_context.thread_type = ThreadType.AUTO
     set_color(stream.codec_context, settings.color)
     preset = settings.preset or PRESET[codec]
     if preset not in PRESETS:
