@@ -9,7 +9,8 @@ import pytest
 from boards import BOARD, field_camera, truth, views_of
 from scipy.spatial.transform import Rotation
 
-from freelook.calibration.bundle import Solution, resect, resect_all, rms, solve
+from freelook.calibration.bundle import Solution, fit, resect, resect_all, rms, solve
+from freelook.calibration.minimise import FAR, NEAR
 from freelook.calibration.parameters import (
     HELD,
     Freedom,
@@ -97,6 +98,28 @@ def test_every_point_counts_when_asked() -> None:
 def test_the_rms_is_that_of_distances() -> None:
     assert rms(np.array([[3.0, 4.0], [0.0, 0.0]])) == pytest.approx(np.sqrt(12.5))
     assert np.isnan(rms(np.zeros((0, 2))))
+
+
+def test_a_fit_is_a_solution_less_what_is_known_about_it() -> None:
+    made = views_of(KANNALA, 6, 9, outliers=0.1)
+    plain, known = fit(KANNALA, made.poses, made.views), solve(KANNALA, made.poses, made.views)
+    assert plain.camera.lens == known.camera.lens
+    assert plain.rms_px == known.rms_px
+    assert plain.noise_px == pytest.approx(known.noise_px, rel=1e-12)
+    few = [view.only(np.arange(len(view.pixels)) < 5) for view in made.views[:2]]
+    with pytest.raises(CalibrationError, match="10 points are too few for 20 unknowns"):
+        fit(KANNALA, made.poses[:2], few, robust=False)
+
+
+@pytest.mark.parametrize("damping", [FAR, NEAR])
+def test_how_the_first_step_is_damped_changes_the_way_only(damping: float) -> None:
+    """From poses five degrees off and another focal length, too, where the whole step is wrong."""
+    made = views_of(KANNALA, 8, 10)
+    wrong = replace(KANNALA, lens=KannalaBrandt(270.0))
+    found = solve(wrong, off(made.poses), made.views, damping=damping)
+    right = solve(KANNALA, made.poses, made.views)
+    assert found.rms_px == pytest.approx(right.rms_px, rel=1e-6)
+    assert found.camera.center == pytest.approx(right.camera.center, abs=1e-3)
 
 
 def test_what_is_not_free_stays() -> None:
