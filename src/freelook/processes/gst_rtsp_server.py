@@ -66,8 +66,10 @@ class Served:
             sources = list(self._need_key.items())
         for source, need_key in sources:
             late = source.get_property("current-level-bytes") > MOST_WAITING_BYTES
-            if taken := not late and (key or not need_key):
-                source.emit("push-buffer", Gst.Buffer.new_wrapped(data))
+            taken = not late and (key or not need_key)
+            if taken:  # unless the viewer's pipeline does not run yet
+                flow = source.emit("push-buffer", Gst.Buffer.new_wrapped(data))
+                taken = flow == Gst.FlowReturn.OK
             with self._lock:
                 if source in self._need_key:
                     self._need_key[source] = not taken
