@@ -93,6 +93,8 @@ def test_settings_that_make_no_sense_are_refused(tmp_path: Path) -> None:
         open_sink("rtp://127.0.0.1:9", size=SIZE, audio_from="x.mp4")
     with pytest.raises(SinkError, match="sdp"):
         open_sink(str(tmp_path / "o.mp4"), size=SIZE, sdp="x.sdp")
+    with pytest.raises(SinkError, match="no video file, cannot have preset = fast"):
+        open_sink(str(tmp_path / "o.png"), size=SIZE, preset="fast")
     for argument in ("rtp://127.0.0.1", "rtp://:5004", "rtp://127.0.0.1:99999", "rtp://["):
         with pytest.raises(SinkError, match="host and port"):
             open_sink(argument, size=SIZE)

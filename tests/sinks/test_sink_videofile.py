@@ -157,6 +157,23 @@ def test_what_a_killed_program_wrote_plays(suffix: str, tmp_path: Path) -> None:
     assert times[:3] == pytest.approx([0, 0.04, 0.08])
 
 
+@pytest.mark.parametrize(
+    ("preset", "seen"), [(None, b"subme=2"), ("ultrafast", b"subme=0"), ("medium", b"subme=7")]
+)
+def test_x264_works_as_asked_on_whole_frames(
+    preset: str | None, seen: bytes, tmp_path: Path
+) -> None:
+    """It writes its settings into the stream. Threads on slices of a frame would be slower; it
+    cuts only where there is more than one core, and pictures large enough."""
+    size = (320, 256)
+    sink = VideoFile(str(tmp_path / "out.mp4"), SinkSettings(size, preset=preset))
+    sink.write(Frame(i420_from_rgb(np.zeros((*size[::-1], 3)), ColorSpace()), 0))
+    sink.close()
+    said = (tmp_path / "out.mp4").read_bytes()
+    assert seen in said
+    assert b"sliced_threads=0" in said
+
+
 def test_a_file_without_frames_is_not_left_behind(tmp_path: Path) -> None:
     VideoFile(str(tmp_path / "out.mp4"), SinkSettings(SIZE)).close()
     assert not (tmp_path / "out.mp4").exists()
@@ -173,6 +190,8 @@ def test_what_cannot_be_written_is_refused(tmp_path: Path) -> None:
         sink(codec="vp8")
     with pytest.raises(SinkError, match="frames per second"):
         sink(fps=0)
+    with pytest.raises(SinkError, match="unknown preset 'quick'; known: ultrafast"):
+        sink(preset="quick")
     open_sink = sink()
     with pytest.raises(SinkError, match="16 x 16"):
         open_sink.write(Frame(i420_from_rgb(np.zeros((16, 16, 3)), ColorSpace()), 0))
