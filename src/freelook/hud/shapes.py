@@ -329,7 +329,8 @@ def _arc(x: float, y: float, share: float) -> Floats:
 def _warnings(scene: Scene) -> Shapes:
     known, place = definition(), scene.place
     look, letter = known["warnings"], known["text"]["advance"]
-    most = max(8, floor((place.width - 2 * known.margin - 2 * look["pad"]) / look["text"] / letter))
+    free = place.width - 2 * place.inset[0] - 2 * known.margin - 2 * look["pad"]
+    most = max(8, floor(free / look["text"] / letter))
     y = place.middle_y + look["gap"]
     for warned in scene.state.warnings[: look["most"]]:
         text = shortened(capitals(warned.text), most)

@@ -97,7 +97,6 @@ class Overlay:
 
     def rest(self, told: Told, state: HudState, size: tuple[int, int], now_ns: int) -> None:
         """Make what rests, if it changed; `state` needs to know nothing of it yet."""
-        self._rested_ns = now_ns
         dials = {"head": self.head_ages.dial(now_ns), "video": self.video_ages.dial(now_ns)}
         situation = replace(told.situation, video_late_ms=dials["video"].median_ms)
         state = replace(
@@ -110,6 +109,7 @@ class Overlay:
             dials=dials,
         )
         pen, place = self._pen_for(size), self._place(size, RESTING)
+        self._rested_ns = now_ns
         new = (self._made_for, place, *_resting_parts(state))
         if new != self._resting_of:
             self._resting, self._resting_of = pen.ink(shapes(state, place)), new

@@ -388,7 +388,8 @@ function arc({ steps, radius }, x, y, share) {
 /** @param {Scene} scene @returns {Shape[]} */
 function warnings({ known, state, place }) {
   const { warnings: look, text: { advance }, margin } = known;
-  const most = max(8, floor((place.width - 2 * margin - 2 * look.pad) / look.text / advance));
+  const free = place.width - 2 * place.inset[0] - 2 * margin - 2 * look.pad;
+  const most = max(8, floor(free / look.text / advance));
   return (state.warnings ?? []).slice(0, look.most).flatMap((warned, i) => {
     const y = place.middleY + look.gap + i * look.line;
     const words = shortened(capitals(known, warned.text), most);

@@ -31,8 +31,10 @@ export function compass(headingDeg) {
   return QUARTERS[number] ?? String(number);
 }
 
-/** Milliseconds: with a decimal below 10. @param {number} value */
+/** Milliseconds: with a decimal below 10; from a second on, seconds.
+ * @param {number} value @returns {string} */
 export function tenths(value) {
+  if (value >= 999.5) return `${tenths(value / 1000)}S`;
   if (value >= 10) return String(whole(value));
   const number = whole(10 * value);
   return `${Math.floor(number / 10)}.${number % 10}`;

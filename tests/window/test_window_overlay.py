@@ -1,0 +1,133 @@
+"""The HUD over a window's views, drawn off-screen: off it changes nothing, both eyes get the same,
+what it tells, its keys, and that a command may choose it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scene import CAMERA
+
+from freelook.cli import main
+from freelook.errors import MissingExtra, RenderError
+from freelook.gimbal import Stabiliser
+from freelook.hud import THEMES, Dial, HudState, LensField, Situation
+from freelook.renderers.gl_context import open_context
+from freelook.rotations import body_from_view
+from freelook.types import Attitude
+from freelook.window.events import Key
+from freelook.window.eyes import Optics
+from freelook.window.overlay import Overlay, RecentAges, Told
+from freelook.window.pilot import Pilot
+
+pytest.importorskip("moderngl")
+
+WIDTH, HEIGHT = SIZE = (640, 360)
+STATE = HudState(body_from_view(10, 5), 80.0, lens=LensField.of(CAMERA))
+FOCAL_PX = 300.0
+SECOND = 1_000_000_000
+
+
+@pytest.fixture(scope="module")
+def context() -> Iterator[Any]:
+    try:
+        opened = open_context()
+    except (MissingExtra, RenderError) as error:
+        pytest.skip(f"no OpenGL here: {error}")
+    with opened:
+        yield opened
+    opened.release()
+
+
+def drawn(context: Any, overlay: Overlay) -> NDArray[np.uint8]:
+    frame = context.framebuffer([context.texture(SIZE, 3)])
+    frame.use()
+    context.clear(0.2, 0.4, 0.8)
+    overlay.draw(STATE, SIZE, frame, FOCAL_PX)
+    data = np.frombuffer(frame.read(components=3, alignment=1), np.uint8)
+    frame.release()
+    return data.reshape(HEIGHT, WIDTH, 3)[::-1]
+
+
+def test_off_nothing_is_drawn_and_one_key_switches(context: Any) -> None:
+    overlay = Overlay(context, theme="off")
+    assert not overlay.is_due(10 * SECOND)
+    assert np.ptp(drawn(context, overlay).reshape(-1, 3), axis=0).max() == 0
+    version = overlay.version
+    overlay.toggle()
+    assert overlay.version > version  # a view that else would be the same is drawn anew
+    on = drawn(context, overlay)
+    assert (on != on[0, 0]).any(axis=2).mean() > 0.01
+    before = overlay.theme
+    overlay.next_theme()
+    assert overlay.theme == THEMES[1] != before
+    assert (drawn(context, overlay) != on).any()
+
+
+def test_what_rests_is_made_anew_only_when_it_changes(context: Any) -> None:
+    overlay = Overlay(context)
+    assert overlay.is_due(SECOND)
+    told = Told(Situation(video_age_s=0.1))
+    overlay.rest(told, STATE, SIZE, SECOND)
+    quiet, version = drawn(context, overlay), overlay.version
+    assert not overlay.is_due(SECOND + SECOND // 10)
+    overlay.rest(told, STATE, SIZE, 2 * SECOND)
+    assert overlay.version == version
+    overlay.rest(Told(Situation(video_age_s=4.0)), STATE, SIZE, 3 * SECOND)
+    assert overlay.version > version
+    lost = drawn(context, overlay)
+    changed = np.flatnonzero((lost != quiet).any(axis=(1, 2)))
+    assert changed.min() >= 88  # below the tape
+    assert changed.max() <= 88 + 40
+
+
+def test_both_eyes_see_the_same_lines_each_with_its_shift(context: Any) -> None:
+    overlay = Overlay(context, Optics("side-by-side", 6.0))
+    both = drawn(context, overlay)
+    left, right = both[:, : WIDTH // 2], both[:, WIDTH // 2 :]
+    inner = slice(40, WIDTH // 2 - 40)
+    shifted = np.roll(right, 12, axis=1)  # each six pixels towards the nose
+    assert np.abs(left[:, inner].astype(int) - shifted[:, inner]).max() <= 1
+    assert (left != left[0, 0]).any()
+
+
+def test_dials_tell_of_the_last_moments() -> None:
+    ages = RecentAges()
+    assert ages.dial(0) == Dial()
+    for k in range(20):
+        ages.add(k * SECOND // 20, (k + 1) * 1_000_000)
+    assert ages.dial(SECOND) == Dial(10.0, 19.0)
+    ages.add(3 * SECOND, 50_000_000)
+    assert ages.dial(3 * SECOND) == Dial(50.0, 50.0)
+
+
+def test_the_pilots_keys_and_who_is_in_command() -> None:
+    pilot = Pilot({}, 90.0)
+    keys = [Key("i", True), Key("i", False), Key("u", True)]
+    assert pilot.take(keys, 0, SIZE) == ["lines", "theme"]
+    assert pilot.command(0) == ("hand", "tracking", None)
+    pilot.toggle(0)
+    assert pilot.command(0) == ("hand", "front", None)
+
+
+def test_the_vehicles_attitude_is_known_in_any_mode() -> None:
+    stabiliser = Stabiliser()
+    pilot = Pilot({}, 90.0, stabiliser)
+    assert pilot.attitude(0) is None
+    turned = body_from_view(30, 0)
+    for t_ns in (0, SECOND // 10):
+        stabiliser.push(Attitude(t_ns, turned))
+    found = pilot.attitude(SECOND // 20)
+    assert found is not None
+    assert (found.inv() * turned).magnitude() == pytest.approx(0, abs=1e-9)
+
+
+def test_an_unknown_theme_is_refused(context: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(RenderError, match="unknown HUD theme 'dusk'"):
+        Overlay(context, theme="dusk")
+    with pytest.raises(SystemExit):
+        main(["fly", "x.mp4", "--lens", "demo", "--hud", "dusk"])
+    assert "'day', 'night', 'plain', 'off'" in capsys.readouterr().err
