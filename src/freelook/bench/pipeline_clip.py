@@ -144,4 +144,4 @@ def luma_psnr_db(path: Path, exact: dict[int, Floats]) -> float:
                 errors.append(float(((luma - exact[index]) ** 2).mean()))
     if len(errors) < len(exact):
         return float("nan")
-    return float(10 * np.log10(255**2 / max(np.mean(errors), 1e-9)))
+    return float(10 * np.log10(255**2 / max(float(np.mean(errors)), 1e-9)))

@@ -212,11 +212,6 @@ def _crop(job: Job) -> tuple[int, int, int, int] | None:
         half = int(min(before, after))
         starts.append(max(0, round(before - half)) // 2 * 2)
         sizes.append(min(2 * half, size - starts[-1]) // 2 * 2)
-    if all(
-        abs(center - (size - 1) / 2) < 1
-        for center, size in zip(job.camera.center, job.clip.size, strict=True)
-    ):
-        return None
     return sizes[0], sizes[1], starts[0], starts[1]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import tempfile
 from collections.abc import Callable
 from math import isfinite
@@ -17,6 +18,7 @@ from ._cameras import LENS_HELP
 
 if TYPE_CHECKING:
     from ..bench.pipeline import Plan, Row
+    from ..bench.pipeline_clip import Clip, Simulated
 
 SECONDS = 6.0
 ABOUT = """\
@@ -136,9 +138,7 @@ def _plan(args: argparse.Namespace, folder: Path) -> Plan:
     )
 
 
-def _simulated(args: argparse.Namespace, folder: Path) -> Any:
-    import os
-
+def _simulated(args: argparse.Namespace, folder: Path) -> tuple[Simulated, str]:
     from ..bench import pipeline_clip
     from ..formats import Profile
     from ..formats.freelook import write
@@ -149,7 +149,7 @@ def _simulated(args: argparse.Namespace, folder: Path) -> Any:
     return pipeline_clip.Simulated(camera, os.cpu_count() or 1), str(lens)
 
 
-def _recorded(args: argparse.Namespace, simulated: Any, target: Path) -> Any:
+def _recorded(args: argparse.Namespace, simulated: Simulated, target: Path) -> Clip:
     from ..bench.pipeline_clip import FPS
     from ._bars import bar
 
