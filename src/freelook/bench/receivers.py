@@ -65,7 +65,8 @@ class Ffmpeg:
 
     name = "ffmpeg"
     streams = PULLED
-    HURRY: ClassVar = ("-fflags", "nobuffer", "-flags", "low_delay", "-analyzeduration", "300000")
+    HURRY: ClassVar = ("-fflags", "nobuffer", "-flags", "low_delay", "-analyzeduration", "0")
+    PROBE: ClassVar = {"udp": "32768"}  # bytes until it knows what it is; others say it in SDP
 
     def missing(self) -> str | None:
         return None if shutil.which("ffmpeg") else "ffmpeg is not installed"
@@ -79,8 +80,18 @@ class Ffmpeg:
             "udp": ["-i", stream.url],
         }
         pulled = ["-rtsp_transport", stream.transport, "-i", stream.url]
-        command = ["ffmpeg", "-v", "fatal", "-nostdin", *self.HURRY, *how.get(stream.kind, pulled)]
-        command += ["-fps_mode", "passthrough", "-pix_fmt", "yuv420p", "-f", "rawvideo", "pipe:1"]
+        command = ["ffmpeg", "-v", "fatal", "-nostdin", *self.HURRY]
+        command += ["-probesize", self.PROBE.get(stream.kind, "32")]
+        command += [
+            *how.get(stream.kind, pulled),
+            "-fps_mode",
+            "passthrough",
+            "-pix_fmt",
+            "yuv420p",
+            "-f",
+            "rawvideo",
+            "pipe:1",
+        ]
         return raw_pictures(command, seconds)
 
 
@@ -144,7 +155,11 @@ class Vlc:
             os.mkfifo(pipe)
             os.chmod(pipe, 0o666)
             command = ["vlc", "-I", "dummy", "-q", *self.HURRY, "--vout=yuv", f"--yuv-file={pipe}"]
-            command += ["--yuv-chroma=I420", f"udp://@127.0.0.1:{stream.port}"]
+            command += [
+                "--yuv-chroma=I420",
+                "--no-yuv-yuv4mpeg2",
+                f"udp://@127.0.0.1:{stream.port}",
+            ]
             with raw_pictures(command, seconds, pipe) as seen:
                 yield seen
 
