@@ -36,6 +36,9 @@ def test_a_fixed_direction_and_other_words() -> None:
     assert parse("stream:udp://[::1]:5,bitrate=800k").bitrate == 800_000
     assert parse("virtual-camera:/dev/video9").name == "virtual-camera:/dev/video9"
     assert parse("file:a.mp4,layout=quad").layout == "quad"
+    assert parse("file:a.mp4,hud=night").hud == "night"
+    assert parse("snapshot:a.png,hud=on").hud == "day"
+    assert parse("file:a.mp4").hud is None
     assert parse("page") == OutputSpec("page", text="page")
 
 
@@ -62,6 +65,9 @@ def test_a_fixed_direction_and_other_words() -> None:
         ("stream:rtp://h:1,codec=av1", "known: h264, h265"),
         ("file:a.mp4,overwrite=no", "write just 'overwrite'"),
         ("terminal,head=", "is empty"),
+        ("file:a.mp4,hud=dusk", "known: on, day, night, plain"),
+        ("terminal,hud=on", "terminal has no option 'hud'"),
+        ("file:a.mp4,hud=on,layout=pip", "a HUD belongs to one view"),
         ("terminal,head=a,yaw=1", "either a head or yaw"),
     ],
 )

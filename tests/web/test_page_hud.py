@@ -4,8 +4,6 @@ canvas the same picture; nothing is drawn where no shape is; keys; what the stat
 from __future__ import annotations
 
 import base64
-import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,8 +25,6 @@ from freelook.hud import (
 from freelook.hud.letters import make_sheet
 from freelook.renderers.gl_context import open_context
 from freelook.renderers.gl_pen import GlPen
-
-sys.path.append(str(Path(__file__).parents[1] / "hud"))
 from hud_states import SIZES, STATES, message
 
 pytestmark = pytest.mark.browser

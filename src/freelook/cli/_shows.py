@@ -39,8 +39,9 @@ def add_show_argument(parser: argparse.ArgumentParser) -> None:
         help="page (the default; for browsers), window, stream:URL (rtp, udp, rtsp, "
         "rtsp-server, whip+http, whip+https), file:PATH, "
         "snapshot:PATH, terminal or virtual-camera; can be given again. Keys: size=1280x720, "
-        "hfov=90, projection=NAME, layout=quad|pip|panorama, head=NAME (of a tracker), yaw=, "
-        "pitch=, roll= (a fixed direction), fps=, bitrate=4M, codec=h264|h265, "
+        "hfov=90, projection=NAME, layout=quad|pip|panorama, "
+        "hud=on (or a theme of --hud: lines burnt into the picture), head=NAME (of a tracker), "
+        "yaw=, pitch=, roll= (a fixed direction), fps=, bitrate=4M, codec=h264|h265, "
         "encoder=auto|software|hardware, sdp=FILE, every=SECONDS, overwrite",
     )
 

@@ -37,12 +37,11 @@ class Ink:
 
 
 class Inker:
-    """For one theme at so many pixels per point. `row_of` says where a sheet lies in the texture
-    that holds them all."""
+    """For one theme at so many pixels per point; `sheets` has all letters that ink was made of."""
 
-    def __init__(self, theme: Theme, ratio: float, sheets: Sheets, rows: dict[int, int]) -> None:
+    def __init__(self, theme: Theme, ratio: float) -> None:
+        self.sheets = Sheets(theme.rim_width * ratio, theme.weight)
         self._theme, self._ratio = theme, ratio
-        self._sheets, self._rows = sheets, rows
 
     def ink(self, shapes: Iterable[Shape]) -> Ink:
         pieces: list[Float32s] = []
@@ -75,8 +74,7 @@ class Inker:
 
     def _text(self, shape: Text) -> list[tuple[float, ...]]:
         """Letters on whole pixels: they stay crisp."""
-        sheet = self._sheets.at(shape.size * self._ratio)
-        row = self._rows.get(id(sheet), 0)
+        sheet, row = self.sheets.at(shape.size * self._ratio)
         color = self._theme.color(shape.role, shape.opacity)
         left, top = corner_of(shape, sheet, self._ratio)
         return [

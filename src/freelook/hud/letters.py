@@ -7,7 +7,6 @@ hexadecimal digit; "|" lifts the pen. The page makes its sheets of them in the s
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from math import ceil, floor
@@ -87,16 +86,27 @@ def _covered(ends: Floats, cell: tuple[int, int], half: float, rim_px: float) ->
 
 
 class Sheets:
-    """Of one theme, made when a size is first wanted. `on_new` is told of each."""
+    """Of one theme, made when a size is first wanted, and lying one below the other."""
 
-    def __init__(
-        self, rim_px: float, weight: float, on_new: Callable[[Sheet], None] = lambda _sheet: None
-    ) -> None:
-        self._rim_px, self._weight, self._on_new = rim_px, weight, on_new
-        self._made: dict[float, Sheet] = {}
+    def __init__(self, rim_px: float, weight: float) -> None:
+        self._rim_px, self._weight = rim_px, weight
+        self._made: dict[float, tuple[Sheet, int]] = {}
+        self._rows = 0
 
-    def at(self, size_px: float) -> Sheet:
+    def __len__(self) -> int:
+        return len(self._made)
+
+    def at(self, size_px: float) -> tuple[Sheet, int]:
+        """The sheet, and in which row of them all it begins."""
         if size_px not in self._made:
-            self._made[size_px] = make_sheet(size_px, self._rim_px, self._weight)
-            self._on_new(self._made[size_px])
+            sheet = make_sheet(size_px, self._rim_px, self._weight)
+            self._made[size_px] = (sheet, self._rows)
+            self._rows += len(sheet.covered)
         return self._made[size_px]
+
+    def together(self) -> NDArray[np.uint8]:
+        """All of them, (rows, columns of the widest, 2)."""
+        covered = [sheet.covered for sheet, _ in self._made.values()]
+        width = max(one.shape[1] for one in covered)
+        wide = [np.pad(one, ((0, 0), (0, width - one.shape[1]), (0, 0))) for one in covered]
+        return np.ascontiguousarray(np.concatenate(wide))

@@ -13,6 +13,7 @@ from ..formats import Profile
 from ..formats.freelook import write
 from ..gimbal import LensLimit, Stabiliser
 from ..head import Head
+from ..hud.definition import theme_named
 from ..ingest import Ingest
 from ..mailbox import Mailbox
 from ..renderers import Renderer
@@ -20,7 +21,7 @@ from ..renderers.layout import SMALLEST_PX, LayoutRenderer
 from ..rotations import body_from_view, head_angles_deg
 from ..session import Aim, Session, View
 from ..sinks import SinkSettings, check_sink, find, open_sink
-from ..types import ColorSpace, Frame, Sink
+from ..types import ColorSpace, Frame, Picture, Sink
 from ..viewport import Viewport
 from .runner import Output, OutputStatus
 from .spec import OutputSpec
@@ -142,7 +143,21 @@ def make_output(spec: OutputSpec, flight: Flight) -> Output:
         rate_hz=rate_of(spec),
         retry=spec.kind in TRIED_AGAIN,
         describe=lambda view: facts(view, viewport, lens) | {"state": flight.state()},
+        finish=burnt_in(spec, flight, viewport) if spec.hud else as_rendered,
     )
+
+
+def as_rendered(view: View) -> Picture:
+    return view.picture
+
+
+def burnt_in(spec: OutputSpec, flight: Flight, viewport: Viewport) -> Callable[[View], Picture]:
+    """What draws the HUD of the spec's theme into views."""
+    from .hud import BurntHud
+
+    head = flight.heads.get(spec.head or next(iter(flight.heads), ""))
+    follows = None if spec.look_deg is not None else head
+    return BurntHud(theme_named(spec.hud or ""), viewport, flight, follows)
 
 
 def secured(spec: OutputSpec) -> OutputSpec:

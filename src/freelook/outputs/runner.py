@@ -15,7 +15,7 @@ from ..errors import FreelookError
 from ..head import RateMeter
 from ..mailbox import Mailbox
 from ..session import Session, View
-from ..types import ColorSpace, Counters, Frame, Sink
+from ..types import ColorSpace, Counters, Frame, Picture, Sink
 
 NAP_S = 0.5  # how long to wait for a frame before looking around again
 RETRY_S = (0.5, 5.0)  # the first and the longest pause before opening again
@@ -24,6 +24,7 @@ LAST_S = 5.0  # how long closing waits
 MakeSession = Callable[[Mailbox[Frame]], Session]
 OpenSink = Callable[[ColorSpace], Sink]
 Describe = Callable[[View], dict[str, str]]
+Finish = Callable[[View], Picture]
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ class Output:
     `make_session` and `open_sink` are called on the output's thread: the first once, the other
     with the pictures' colours, again after a failure if `retry`. `rate_hz` views a second, or
     None for one of every frame. A sink that has `note(facts)` is told `describe(view)` before
-    each write.
+    each write. What is written is `finish(view)`.
     """
 
     def __init__(
@@ -72,6 +73,7 @@ class Output:
         rate_hz: float | None = None,
         retry: bool = True,
         describe: Describe = lambda _view: {},
+        finish: Finish = lambda view: view.picture,
     ) -> None:
         self.name = name
         self._frames = frames
@@ -81,6 +83,7 @@ class Output:
         self._period_ns = None if rate_hz is None else round(NS_PER_S / rate_hz)
         self._retry = retry
         self._describe = describe
+        self._finish = finish
         self._box: Mailbox[Frame] = Mailbox()
         self._session: Session | None = None
         self._sink: Sink | None = None
@@ -181,7 +184,7 @@ class Output:
             note(self._describe(view))
         # at a fixed rate a frame is shown more than once, and its own time would repeat
         t_ns = view.capture_ns if self._period_ns is None else view.display_ns
-        self._sink.write(Frame(view.picture, t_ns))
+        self._sink.write(Frame(self._finish(view), t_ns))
         self._counters.add("shown")
         self._rate.add(self._clock())
         self._state, self._message, self._pause_s = "live", "", RETRY_S[0]

@@ -12,12 +12,13 @@ from typing import Any
 
 from ..addresses import without_password
 from ..errors import SinkError
+from ..hud.definition import THEMES
 from ..projections import PROJECTIONS
 from ..renderers.layout import LAYOUTS
 from ..sinks import By
 
 LOOK = ("yaw", "pitch", "roll")
-VIEW = ("size", "hfov", "projection", "layout", "head", *LOOK)
+VIEW = ("size", "hfov", "projection", "layout", "hud", "head", *LOOK)
 ENCODERS: tuple[By, ...] = ("auto", "software", "hardware")
 CODECS = ("h264", "h265")
 
@@ -48,6 +49,7 @@ class OutputSpec:
     hfov_deg: float | None = None
     projection: str | None = None
     layout: str | None = None
+    hud: str | None = None
     head: str | None = None
     look_deg: tuple[float, float, float] | None = None
     rate_hz: float | None = None
@@ -103,6 +105,8 @@ def _split(text: str) -> tuple[str, dict[str, str]]:
 
 
 def _with(spec: OutputSpec, options: dict[str, str]) -> OutputSpec:
+    if "hud" in options and "layout" in options:
+        raise SinkError(f"--show {spec.text}: a HUD belongs to one view; leave hud or layout out")
     if "head" in options and any(key in options for key in LOOK):
         raise SinkError(f"--show {spec.text}: give either a head or yaw, pitch and roll")
     changes: dict[str, Any] = {}
@@ -180,11 +184,17 @@ def _some_text(text: str) -> str:
     return text
 
 
+def _theme(text: str) -> str:
+    """Of the HUD; "on" is the usual one."""
+    return THEMES[0] if text == "on" else _one_of(("on", *THEMES))(text)
+
+
 READERS: dict[str, Callable[[str], Any]] = {
     "size": _size,
     "hfov": _between(10, 360, "degrees"),
     "projection": _one_of(tuple(PROJECTIONS)),
     "layout": _one_of(tuple(LAYOUTS)),
+    "hud": _theme,
     "head": _some_text,
     "yaw": _number,
     "pitch": _number,

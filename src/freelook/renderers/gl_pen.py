@@ -5,11 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-import numpy as np
-
 from ..hud.definition import Theme, pen_source
 from ..hud.ink import LETTER, PIECE, Float32s, Ink, Inker
-from ..hud.letters import Sheet, Sheets
 from ..hud.shapes import Shape
 from .gl_shader import HEADER
 
@@ -25,11 +22,9 @@ class GlPen:
 
     def __init__(self, context: Any, theme: Theme, ratio: float) -> None:
         self._context, self._theme = context, theme
-        self._sheets: list[Sheet] = []
-        self._rows: dict[int, int] = {}
-        sheets = Sheets(theme.rim_width * ratio, theme.weight, self._add)
-        self._inker = Inker(theme, ratio, sheets, self._rows)
+        self._inker = Inker(theme, ratio)
         self._texture: Any = None
+        self._sheets = 0  # in the texture
         self._lines = _Drawn(context, "LINE", PIECE, "4f 1f 4f/i", ("ends", "half_width", "color"))
         self._letters = _Drawn(context, "LETTER", LETTER, "4f 2f 4f/i", ("cell", "corner", "color"))
 
@@ -70,25 +65,17 @@ class GlPen:
         if self._texture is not None:
             self._texture.release()
 
-    def _add(self, sheet: Sheet) -> None:
-        """One below the other in one texture, made anew when it is next drawn with."""
-        self._rows[id(sheet)] = sum(known.covered.shape[0] for known in self._sheets)
-        self._sheets.append(sheet)
-        if self._texture is not None:
-            self._texture.release()
-            self._texture = None
-
     def _sheet_texture(self) -> Any:
-        if self._texture is None:
-            width = max(sheet.covered.shape[1] for sheet in self._sheets)
-            wide = [
-                np.pad(sheet.covered, ((0, 0), (0, width - sheet.covered.shape[1]), (0, 0)))
-                for sheet in self._sheets
-            ]
-            covered = np.ascontiguousarray(np.concatenate(wide))
-            size = (width, covered.shape[0])
+        """Made anew when there are more sheets than in it."""
+        sheets = self._inker.sheets
+        if self._sheets != len(sheets):
+            if self._texture is not None:
+                self._texture.release()
+            covered = sheets.together()
+            size = (covered.shape[1], covered.shape[0])
             self._texture = self._context.texture(size, 2, covered.tobytes(), alignment=1)
             self._texture.filter = (self._context.NEAREST, self._context.NEAREST)
+            self._sheets = len(sheets)
         return self._texture
 
 
