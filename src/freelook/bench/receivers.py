@@ -27,6 +27,7 @@ from ..latency import read_stamp
 
 SIZE = (640, 360)
 PICTURE_BYTES = SIZE[0] * SIZE[1] * 3 // 2
+FRAME = b"FRAME\n"
 PULLED = ("rtp", "udp", "rtsp-server, UDP", "rtsp-server, TCP")
 Seen = Iterator[tuple[int, int | None]]
 Receiving = AbstractContextManager[tuple[int, Seen]]
@@ -135,11 +136,14 @@ class GStreamer:
 
 
 class Vlc:
-    """VLC, its caches at 0. Debian's has no RTSP and no RTP with a description."""
+    """VLC with a short cache; without `clock-synchro=0` it falls behind any live MPEG-TS.
+
+    Debian's has no RTSP, and no RTP with a description.
+    """
 
     name = "VLC"
     streams = ("udp",)
-    HURRY: ClassVar = ("--network-caching=0", "--live-caching=0", "--clock-jitter=0", "--no-audio")
+    HURRY: ClassVar = ("--network-caching=100", "--clock-synchro=0", "--no-audio")
 
     def missing(self) -> str | None:
         return None if shutil.which("vlc") else "VLC is not installed"
@@ -157,7 +161,6 @@ class Vlc:
             command = ["vlc", "-I", "dummy", "-q", *self.HURRY, "--vout=yuv", f"--yuv-file={pipe}"]
             command += [
                 "--yuv-chroma=I420",
-                "--no-yuv-yuv4mpeg2",
                 f"udp://@127.0.0.1:{stream.port}",
             ]
             with raw_pictures(command, seconds, pipe) as seen:
@@ -168,8 +171,8 @@ class Vlc:
 def raw_pictures(
     command: list[str], seconds: float, pipe: Path | None = None
 ) -> Iterator[tuple[int, Seen]]:
-    """What a program writes as I420, for so long at most: to its standard output, or to a named
-    pipe."""
+    """What a program writes as I420, for so long at most: to its standard output, or as YUV4MPEG2
+    to a named pipe."""
     begin_ns = now_ns()
     # VLC will not be run by the system's administrator
     who = "nobody" if os.geteuid() == 0 and pipe is not None else None
@@ -182,7 +185,7 @@ def raw_pictures(
         assert process.stdout is not None
         opened: IO[bytes] = process.stdout if pipe is None else _both_ends(pipe)
         with opened:
-            yield begin_ns, _seen(opened, process)
+            yield begin_ns, _seen(opened, process, headed=pipe is not None)
     finally:
         end.cancel()
         process.kill()
@@ -194,18 +197,23 @@ def _both_ends(pipe: Path) -> IO[bytes]:
     return os.fdopen(os.open(pipe, os.O_RDONLY | os.O_NONBLOCK), "rb", buffering=0)
 
 
-def _seen(opened: IO[bytes], process: subprocess.Popen[bytes]) -> Seen:
+def _seen(opened: IO[bytes], process: subprocess.Popen[bytes], headed: bool) -> Seen:
+    """`headed`: there is a line before every picture, as in YUV4MPEG2."""
     width, height = SIZE
-    never, kept = threading.Event(), bytearray()
+    never, kept, begun = threading.Event(), bytearray(), not headed
     while True:
-        if data := opened.read(PICTURE_BYTES - len(kept)):
+        if data := opened.read(PICTURE_BYTES):
             kept += data
         elif process.poll() is not None:
             return
         else:  # a named pipe, before or between pictures
             never.wait(0.0005)
-        if len(kept) == PICTURE_BYTES:
+        if not begun and (found := kept.find(FRAME)) >= 0:
+            del kept[: found + len(FRAME)]
+            begun = True
+        if begun and len(kept) >= PICTURE_BYTES:
             arrived_ns = now_ns()
             luma = np.frombuffer(bytes(kept), np.uint8, width * height).reshape(height, width)
+            del kept[:PICTURE_BYTES]
+            begun = not headed
             yield arrived_ns, read_stamp(luma)
-            kept.clear()
