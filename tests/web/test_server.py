@@ -5,9 +5,13 @@ from __future__ import annotations
 import json
 from typing import Any
 
+import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from whep_peer import Bench, Camera, Peer, flown, until
 
+from freelook.outputs.runner import OutputStatus
+from freelook.web import messages
 from freelook.web.security import Guard
 
 SDP = {"Content-Type": "application/sdp"}
@@ -52,14 +56,30 @@ def test_the_page_is_never_stored_and_may_load_nothing_foreign() -> None:
     flown(test)
 
 
-def test_the_shader_is_the_renderers() -> None:
+@pytest.mark.parametrize(
+    ("address", "word"),
+    [("view.glsl", "t_max"), ("pen.glsl", "half_width"), ("hud.json", "themes")],
+)
+def test_shaders_and_hud_are_those_of_this_side(address: str, word: str) -> None:
     async def test(station: Bench) -> None:
-        status, text, _ = await ask(station, "GET", "/view.glsl")
+        status, text, _ = await ask(station, "GET", f"/{address}")
         assert status == 200
         assert not text.lstrip().startswith("#version")
-        assert "t_max" in text
+        assert word in text
 
     flown(test)
+
+
+def test_the_page_learns_of_attitude_and_recordings() -> None:
+    turned = Rotation.from_euler("ZYX", [90, 0, 0], degrees=True)  # the vehicle heads east
+    told = json.loads(messages.frame(7, 3, world_from_body=turned))
+    # in a head's axes, y down: to the right
+    assert told["world"] == pytest.approx([np.sqrt(0.5), 0, np.sqrt(0.5), 0], abs=1e-6)
+    assert "world" not in json.loads(messages.frame(7, 3))
+    output = OutputStatus("file:a.mp4", "live", "", 30.0, {"shown": 12})
+    expected = {"name": "file:a.mp4", "state": "live", "message": "", "shown": 12}
+    assert messages.recording(output) == expected
+    assert messages.status({}, [], 0, None, [expected])["recordings"] == [expected]
 
 
 @pytest.mark.parametrize("path", ["/static/../server.py", "/static/%2e%2e/server.py", "/nothing"])
