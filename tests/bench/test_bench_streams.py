@@ -71,6 +71,7 @@ def test_streams_are_told_by_receiver(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     stream = nullcontext(Stream("udp", "udp://127.0.0.1:9", 9, Path()))
+    monkeypatch.setenv("COLUMNS", "120")  # nothing is broken into lines
     monkeypatch.setattr(streams, "stamped", lambda *_: stream)
     monkeypatch.setattr(streams, "RECEIVERS", (Late(), Absent()))
     assert main(["bench", "streams", "--seconds", "10", "--json"]) == 0
