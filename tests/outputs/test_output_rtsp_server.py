@@ -19,11 +19,14 @@ import pytest
 from received import SIZE, START_NS, STEP_NS, assert_received, feed_until, ffmpeg, frame
 
 from freelook.bench.resident import resident_bytes
+from freelook.cli._shows import reachable
 from freelook.datagrams import free_port
 from freelook.errors import SinkError
+from freelook.outputs.spec import parse
 from freelook.sinks import open_sink
 from freelook.sinks.rtspserver import RtspServer, invitation, python_with_gstreamer, secured
 from freelook.types import ColorSpace, Frame, Sink
+from freelook.web import security
 
 pytestmark = pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="needs the ffmpeg program")
 needs_gstreamer = pytest.mark.skipif(
@@ -260,6 +263,17 @@ def test_a_password_is_made_up_where_one_is_needed() -> None:
     assert invitation(made) == made.replace("rtsp-server", "rtsp")
     for address in ("rtsp-server://127.0.0.1:8554", "rtsp-server://a:b@0.0.0.0:1", made):
         assert secured(address) == address
+
+
+def test_viewers_are_told_where_and_the_status_line_is_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(security, "local_addresses", lambda: ["192.168.1.7", "fd00::7"])
+    url = "rtsp://pilot:x@{}:8554/view"
+    assert reachable(url.format("192.168.1.7")) == [url.format("192.168.1.7")]
+    everywhere = [url.format(host) for host in ("127.0.0.1", "192.168.1.7", "[fd00::7]")]
+    assert reachable(url.format("0.0.0.0")) == everywhere[:2]
+    assert reachable(url.format("[::]")) == everywhere
+    spec = parse("stream:rtsp-server://pilot:x@0.0.0.0:8554/view,size=64x48")
+    assert spec.name == "stream:rtsp-server://0.0.0.0:8554/view"
 
 
 @needs_gstreamer
