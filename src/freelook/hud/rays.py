@@ -14,6 +14,7 @@ from ..lens import Floats
 from .definition import definition
 from .words import bearing, compass, signed
 
+NOSE = 27  # straight pieces
 Degrees = float | Sequence[float] | Floats
 
 
@@ -46,8 +47,8 @@ class Grid:
     between_labels: NDArray[np.bool_]
 
     def split(self, values: Floats) -> list[Floats]:
-        """Of something for each ray, the part for each part."""
-        return np.split(values, np.cumsum(self.counts)[:-1])
+        """Of something for each ray and for those of `nose`, the part for each part."""
+        return np.split(values, np.cumsum([*self.counts, NOSE]))
 
 
 @cache
@@ -79,17 +80,16 @@ def grid() -> Grid:
 
 
 @cache
-def nose() -> tuple[Floats, ...]:
-    """The vehicle's: a ring, two wings and a fin."""
+def nose() -> Floats:
+    """The vehicle's: a ring, two wings and a fin, as starts of straight pieces and then their ends,
+    (2 * NOSE, 3)."""
     look = definition()["nose"]
-    turn = np.linspace(0, 2 * np.pi, 25)
+    turn = np.linspace(0, 2 * np.pi, NOSE - 2)
     ring, wing, fin = look["ring_deg"], look["wing_deg"], look["fin_deg"]
-    return (
-        directions(ring * np.cos(turn), ring * np.sin(turn)),
-        directions([-wing, -ring], [0, 0]),
-        directions([ring, wing], [0, 0]),
-        directions([0, 0], [ring, fin]),
-    )
+    round_ = directions(ring * np.cos(turn), ring * np.sin(turn))
+    starts = directions([-wing, ring, 0], [0, 0, ring])
+    ends = directions([-ring, wing, 0], [0, 0, fin])
+    return np.concatenate([round_[:-1], starts, round_[1:], ends])
 
 
 @cache

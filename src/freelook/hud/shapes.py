@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..lens import Floats
 from ..projections import Projection, projection_named
-from ..rotations import FRD_FROM_RDF, RDF_FROM_FRD
+from ..rotations import RDF_FROM_FRD
 from . import rays
 from .definition import definition
 from .place import Place, Rect
@@ -23,7 +23,7 @@ from .words import bearing, capitals, compass, shortened, signed, tenths, whole
 
 FAR = 2.0  # of the longer side, from the middle: what is farther away is not drawn
 LONGEST = 0.6  # of the longer side: a straight piece that is longer goes round the back
-CUT_OFF = 20  # points outside the view where a label still shows a part of itself
+CUT_OFF = 20  # points outside the view where something may still show a part of itself
 
 
 @dataclass(frozen=True)
@@ -59,6 +59,8 @@ class Text:
 
 
 Shape = Lines | Box | Text
+NONE = np.empty((0, 3))
+HEAD_FROM_BODY: Floats = RDF_FROM_FRD.as_matrix()
 Shapes = Iterator[Shape]
 
 
@@ -75,21 +77,21 @@ class Scene:
         self.state, self.place = state, place
         self.kind: Projection = projection_named(state.projection)
         self.focal = place.width / 2 / self.kind.half_width(state.hfov_deg / 2)
-        self.head_from_view: Floats = (RDF_FROM_FRD * state.body_from_view).as_matrix()
+        self.head_from_view: Floats = HEAD_FROM_BODY @ state.body_from_view.as_matrix()
         self.level_from_view, self.level_from_head = self.head_from_view, np.eye(3)
         self.world = state.world_from_body is not None
         if state.world_from_body is not None:
-            turn = RDF_FROM_FRD * state.world_from_body * FRD_FROM_RDF
-            self.level_from_head = turn.as_matrix()
+            world_from_body = state.world_from_body.as_matrix()
+            self.level_from_head = HEAD_FROM_BODY @ world_from_body @ HEAD_FROM_BODY.T
             self.level_from_view = self.level_from_head @ self.head_from_view
 
-    def seen(self, directions: Floats, level: bool = True) -> Floats:
-        """Places (n, 2) of rays (n, 3), level (the world's, or the vehicle's where that is not
-        known) or the head's; NaN for those far away."""
-        turn = self.level_from_view if level else self.head_from_view
+    def seen(self, level: Floats, head: Floats = NONE) -> Floats:
+        """Places (n, 2) of rays (n, 3): first those level in the world (or in the vehicle, where
+        that is not known), then those of a head; NaN for those far away."""
+        rays = np.concatenate([level @ self.level_from_view, head @ self.head_from_view])
         middle = np.array([self.place.width / 2, self.place.height / 2])
         with np.errstate(invalid="ignore", over="ignore"):
-            away = self.focal * self.kind.place(directions @ turn)
+            away = self.focal * self.kind.place(rays)
             away[(np.abs(away) > FAR * self.longer).any(axis=-1)] = np.nan
         return away + middle
 
@@ -98,9 +100,12 @@ class Scene:
         return max(self.place.width, self.place.height)
 
     def pieces(self, starts: Floats, ends: Floats) -> Floats:
-        """(n, 4), without those that are nowhere, or go round the back."""
+        """(n, 4), without those that are nowhere, outside the view, or go round the back."""
         both = np.concatenate([starts, ends], axis=-1)
-        both = both[np.isfinite(both).all(axis=-1)]
+        high = np.array([self.place.width, self.place.height]) + CUT_OFF
+        with np.errstate(invalid="ignore"):  # NaN is nowhere: no comparison holds for it
+            seen = (np.maximum(starts, ends) > -CUT_OFF) & (np.minimum(starts, ends) < high)
+            both = both[seen.all(axis=-1)]
         long = np.hypot(both[:, 2] - both[:, 0], both[:, 3] - both[:, 1]) > LONGEST * self.longer
         return both[~long]
 
@@ -123,7 +128,9 @@ def _horizon(scene: Scene) -> Shapes:
         return  # only the lens knows where
     look, nose = definition()["horizon"], definition()["nose"]
     grid = rays.grid()
-    ladder, marks, level, feet, tops, names = grid.split(scene.seen(grid.all))
+    spots = scene.seen(grid.all, rays.nose())
+    ladder, marks, level, feet, tops, names, starts, ends = grid.split(spots)
+    nose_lines = scene.pieces(starts, ends)
     ladder = ladder.reshape(len(look["ladder_deg"]), -1, 2)
     starts, ends = ladder[:, :-1:2], ladder[:, 1::2]
     between = grid.between_labels
@@ -138,8 +145,7 @@ def _horizon(scene: Scene) -> Shapes:
     for text, point in zip(bearings, names.tolist(), strict=True):
         if text != "0":  # the nose is there
             yield from scene.label(point, text, look["text"])
-    parts = [scene.path(scene.seen(part, level=False)) for part in rays.nose()]
-    yield Lines(np.concatenate(parts), nose["width"], "chosen" if scene.world else "line")
+    yield Lines(nose_lines, nose["width"], "chosen" if scene.world else "line")
 
 
 def _edge(scene: Scene) -> Shapes:
@@ -148,7 +154,7 @@ def _edge(scene: Scene) -> Shapes:
     if lens is None or scene.kind.cut or lens.theta_max > np.pi * 0.98:
         return
     look = definition()["edge"]
-    points = scene.seen(rays.circle(lens.theta_max) @ lens.camera_from_head, level=False)
+    points = scene.seen(NONE, rays.circle(lens.theta_max) @ lens.camera_from_head)
     pieces = scene.pieces(points[:-1:2], points[1::2])
     if len(pieces):
         yield Lines(pieces, look["width"], "chosen", look["opacity"])

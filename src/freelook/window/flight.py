@@ -178,6 +178,8 @@ class Flight:
         camera_from_view = camera.camera_from_body * body_from_view
         self._painter.load(frame.picture, camera, size, hfov_deg)  # again only after a zoom
         self._painter.paint(self._surface.screen, size, camera, camera_from_view, hfov_deg, grey)
+        if self._overlay.on:
+            self._surface.flush()  # the view is drawn while the lines over it are being made
         state = self._hud_of(frame, body_from_view, hfov_deg)
         focal_px = self._painter.viewport(size, hfov_deg).focal_px
         self._overlay.draw(state, size, self._surface.screen, focal_px)

@@ -88,6 +88,7 @@ class Surface:
         try:
             self._window = self._open(monitor)
             self.context = self._make_context()
+            self._flush = ctypes.CFUNCTYPE(None)(_address(self._glfw, "glFlush"))
         except BaseException:
             self._glfw.terminate()
             raise
@@ -178,6 +179,10 @@ class Surface:
             ):
                 return _pad(self._glfw, state)
         return None
+
+    def flush(self) -> None:
+        """Have what was asked for so far begun, while more is being prepared."""
+        self._flush()
 
     def swap(self) -> None:
         """Show what was drawn; with vsync it waits for the screen."""
@@ -271,7 +276,7 @@ class _Loader:
         self._glfw = library
 
     def load_opengl_function(self, name: str) -> int:
-        return ctypes.cast(self._glfw.get_proc_address(name), ctypes.c_void_p).value or 0
+        return _address(self._glfw, name)
 
     def __enter__(self) -> _Loader:
         return self
@@ -281,6 +286,10 @@ class _Loader:
 
     def release(self) -> None:
         pass
+
+
+def _address(library: Any, name: str) -> int:
+    return ctypes.cast(library.get_proc_address(name), ctypes.c_void_p).value or 0
 
 
 def _monitors(library: Any) -> list[Monitor]:

@@ -41,7 +41,7 @@ const { PI, abs, atan2, ceil, cos, floor, hypot, max, min, sin } = Math;
 const RAD = PI / 180;
 const FAR = 2; // of the longer side, from the middle: what is farther away is not drawn
 const LONGEST = 0.6; // of the longer side: a straight piece that is longer goes round the back
-const CUT_OFF = 20; // points outside the view where a label still shows a part of itself
+const CUT_OFF = 20; // points outside the view where something may still show a part of itself
 const WHOLE_SPHERE = PI * 0.98;
 
 export const MOVING = ['horizon', 'edge', 'tape', 'field'];
@@ -126,14 +126,18 @@ function seen(scene, ray, level = true) {
   return abs(x) > far || abs(y) > far ? null : [place.width / 2 + x, place.height / 2 + y];
 }
 
-/** Without those that are nowhere, or go round the back.
+/** Without those that are nowhere, outside the view, or go round the back.
  * @param {Scene} scene @param {(Point | null)[]} starts @param {(Point | null)[]} ends
  * @returns {Piece[]} */
 function pieces(scene, starts, ends) {
   const longest = LONGEST * longer(scene);
+  const { width, height } = scene.place;
+  const outside = (/** @type {number} */ a, /** @type {number} */ b, /** @type {number} */ most) =>
+    max(a, b) <= -CUT_OFF || min(a, b) >= most + CUT_OFF;
   return starts.flatMap((from, i) => {
     const to = ends[i];
-    if (!from || !to || hypot(to[0] - from[0], to[1] - from[1]) > longest) return [];
+    if (!from || !to || outside(from[0], to[0], width) || outside(from[1], to[1], height)
+      || hypot(to[0] - from[0], to[1] - from[1]) > longest) return [];
     return [/** @type {Piece} */ ([from[0], from[1], to[0], to[1]])];
   });
 }
