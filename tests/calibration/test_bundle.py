@@ -111,6 +111,15 @@ def test_a_fit_is_a_solution_less_what_is_known_about_it() -> None:
         fit(KANNALA, made.poses[:2], few, robust=False)
 
 
+def test_a_start_that_is_nowhere_is_no_fit() -> None:
+    """Among others, one whose noise is no number would be neither better nor worse than any."""
+    made = views_of(KANNALA, 3, 9)
+    nowhere = replace(made.poses[0], translation=np.full(3, np.nan))
+    for robust in (False, True):
+        with pytest.raises(CalibrationError, match="do not determine"):
+            fit(KANNALA, [nowhere, *made.poses[1:]], made.views, robust=robust)
+
+
 @pytest.mark.parametrize("damping", [FAR, NEAR])
 def test_how_the_first_step_is_damped_changes_the_way_only(damping: float) -> None:
     """From poses five degrees off and another focal length, too, where the whole step is wrong."""

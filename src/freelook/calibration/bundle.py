@@ -148,6 +148,8 @@ def fit(
     with np.errstate(all="ignore"):
         state, weights = _settled(problem, poses, robust, counted, steps, enough, damping)
         residuals = problem.residuals(state)
+        if not np.isfinite(residuals).all():  # the start was nowhere
+            raise CalibrationError(UNDETERMINED)
         variance = float(weights @ squares(residuals)) / _surplus(problem, state, weights)
     return _fit(problem, state, residuals, weights, float(np.sqrt(variance)))
 
