@@ -73,6 +73,7 @@ def test_every_way_sees_what_is_there(place: int, rows: list[Row]) -> None:
     assert not row.skipped
     assert row.psnr_db > 30
     assert len(row.wall_s) == len(row.start_s) == 1
+    assert row.frames == FRAMES
 
 
 def test_what_looks_elsewhere_is_far_from_it(
@@ -175,6 +176,30 @@ def test_a_way_that_fails_says_why(clip: Clip, lens: str, tmp_path: Path) -> Non
     assert row.skipped == "it failed: no such lens"
 
 
+class Copies:
+    """Writes a finished file, whatever is asked."""
+
+    name = "copies"
+
+    def __init__(self, source: Path) -> None:
+        self._source = source
+
+    def command(self, _job: Job, out: Path) -> list[str]:
+        copy = f"import shutil; shutil.copy({str(self._source)!r}, {str(out)!r})"
+        return [sys.executable, "-S", "-c", copy]
+
+
+def test_what_was_written_is_counted(clip: Clip, lens: str, tmp_path: Path) -> None:
+    cut(clip.path, tmp_path / "short.mp4", 4 / 30)
+    (tmp_path / "text.mp4").write_text("no video")
+    ways = (Copies(tmp_path / "short.mp4"), Copies(tmp_path / "text.mp4"))
+    plan = Plan(clip, lens, CAMERA, VIEW, [COURSE], repeats=1, ways=ways)
+    short, none = pipeline.run(plan, tmp_path)
+    assert (short.frames, short.skipped) == (4, "")
+    assert short.frames_per_s == 4 / short.wall_s[0]
+    assert none.skipped == "it wrote no picture"
+
+
 def test_a_profile_of_another_camera_is_refused(clip: Clip, lens: str, tmp_path: Path) -> None:
     other = equidistant_camera((640, 480))
     with pytest.raises(FreelookError, match="give the profile of this camera"):
@@ -250,7 +275,8 @@ def test_the_command_prints_a_table(
     assert main(["bench", "pipeline", str(clip.path), "--lens", lens, "--seconds", "0.2"]) == 0
     said = capsys.readouterr().out
     assert "6 frames of 320x320 to 1280x720" in said
-    for part in ("moving, yaw alone", "60.0", "41.2", "4.00 x", "skipped: not here"):
+    parts = ("moving, yaw alone", "60.0", "wrote 60 frames", "41.2", "4.00 x", "skipped: not here")
+    for part in parts:
         assert part in said
 
 
@@ -265,6 +291,7 @@ def test_the_command_prints_json(
     ours, ffmpeg, opencv = found["rows"][:3]
     assert (ours["ours_times"], ffmpeg["ours_times"]) == (1.0, 4.0)
     assert (ours["psnr_db"], ffmpeg["psnr_db"]) == (41.25, None)
+    assert ours["frames"] == 60
     assert opencv["skipped"] == "not here"
 
 

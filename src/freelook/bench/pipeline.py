@@ -24,7 +24,7 @@ from ..pose_script import PoseScript
 from ..rotations import body_from_view, head_angles_deg
 from ..session import same_shape
 from ..viewport import Viewport
-from .pipeline_clip import Clip, Floats, Simulated, cut, luma_psnr_db
+from .pipeline_clip import Clip, Floats, Simulated, cut, frames_in, luma_psnr_db
 from .pipeline_ways import WAYS, CannotDo, Job, Way
 
 MOVING, TURNING, FIXED = "moving, yaw and pitch", "moving, yaw alone", "fixed"
@@ -88,6 +88,7 @@ class Plan:
 class Row:
     """What one way took for one course. `skipped` says why there is nothing.
 
+    frames           that it wrote; fewer than the clip has are told beside its name
     wall_s, cpu_s    of each run, all its threads and processes together
     start_s          of each run with one frame alone
     psnr_db          luma against the exact views; NaN where they are not known
@@ -162,9 +163,18 @@ def _measured(
                 _take(rows[place], plan.ways[place], jobs, folder / f"{place}.mp4")
             on_step()
     for place, row in enumerate(rows):
-        if exact and not row.skipped and "no view" not in row.way:
-            row.psnr_db = luma_psnr_db(folder / f"{place}.mp4", exact)
+        if not row.skipped:
+            _look_at(row, folder / f"{place}.mp4", exact)
     yield from rows
+
+
+def _look_at(row: Row, out: Path, exact: dict[int, Floats]) -> None:
+    """What a way wrote: who leaves out pictures is not the faster for it."""
+    row.frames = frames_in(out)
+    if not row.frames:
+        row.skipped = "it wrote no picture"
+    elif exact and "no view" not in row.way:
+        row.psnr_db = luma_psnr_db(out, exact)
 
 
 def _take(row: Row, way: Way, jobs: Sequence[Job], out: Path) -> None:

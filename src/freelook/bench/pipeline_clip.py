@@ -133,6 +133,15 @@ class Simulated:
         return yuv_from_rgb(rgb, self._world.color)[..., 0]
 
 
+def frames_in(path: Path) -> int:
+    """How many pictures a recording has; 0 also where it is none."""
+    try:
+        with av.open(str(path)) as container:
+            return sum(packet.size > 0 for packet in container.demux(video=0))
+    except (FFmpegError, OSError, IndexError):
+        return 0
+
+
 def luma_psnr_db(path: Path, exact: dict[int, Floats]) -> float:
     """Of the frames of a recording with these numbers, together; NaN if one of them is missing."""
     errors = []

@@ -200,6 +200,7 @@ def _figures(row: Row, rows: list[Row]) -> dict[str, Any]:
     for key, value in values.items():
         found = value(row)
         figures[key] = found if isfinite(found) else None
+    figures["frames"] = row.frames
     return {**figures, "wall_s": row.wall_s, "cpu_s": row.cpu_s, "start_s": row.start_s}
 
 
@@ -226,19 +227,20 @@ def _print(plan: Plan, rows: list[Row], notes: list[str]) -> None:
             table.add_column(column, justify="right")
         for row in rows:
             if (row.course, row.preset) == (course, preset):
-                table.add_row(*_cells(row, rows))
+                table.add_row(*_cells(row, rows, clip.frames))
         console.print(table)
     for note in notes:
         print(note)
 
 
-def _cells(row: Row, rows: list[Row]) -> list[str]:
+def _cells(row: Row, rows: list[Row], frames: int) -> list[str]:
     if row.skipped:
         return [f"{row.way}\n  skipped: {row.skipped}"]
     psnr = f"{row.psnr_db:.1f}" if isfinite(row.psnr_db) else ""
     ratio = _ratio(row, rows)
+    written = "" if row.frames == frames else f"\n  wrote {row.frames} frames"
     return [
-        row.way,
+        row.way + written,
         f"{row.frames_per_s:.1f}",
         f"{ratio:.2f} x" if isfinite(ratio) else "",
         f"{row.running_frames_per_s:.1f}",
