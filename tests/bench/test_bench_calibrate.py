@@ -220,6 +220,24 @@ def test_bench_calibrate_says_how_near_the_best_ours_is(
     assert "--data FOLDER" in printed
 
 
+def test_bench_calibrate_tells_a_failure_of_ours(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """There is nothing to time then, and the others' rows are still printed."""
+    pretend_to_run(monkeypatch)
+    ways = (Told(replace(CAMERA, center=(-9e3, 0.0)), OURS[0].name), Told(CAMERA))
+    monkeypatch.setattr(bench, "run", lambda sets, choices, **more: run(sets, ways, **more))
+    monkeypatch.setattr(calibration_compared, "timed", fails)
+    assert main(["bench", "calibrate"]) == 0
+    printed = capsys.readouterr().out
+    assert "small: freelook, auto fails: ends at" in printed
+    assert "told" in printed
+
+
+def fails(_each: Set) -> Timed:
+    raise PeerFailed("no lens")
+
+
 class Gone(Told):
     def missing(self) -> str:
         return "it is not there"

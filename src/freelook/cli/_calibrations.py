@@ -39,7 +39,8 @@ def run(args: argparse.Namespace) -> int:
     choices = (calibrate.CHOSEN,)
     rows = list(calibrate.run(sets, choices=choices, cross_validate=not args.quick, progress=say))
     say("how long ours takes")
-    times = [timed(each) for each in simulated]
+    ours = {row.set for row in rows if row.way == calibrate.OURS[0].name and isfinite(row.rms_px)}
+    times = [timed(each) for each in simulated if each.name in ours]
     if args.json:
         found = {
             "rows": [_figures(row) for row in rows],
@@ -51,7 +52,8 @@ def run(args: argparse.Namespace) -> int:
     _print_rows(rows)
     for each in compared(rows):
         print(_said(each))
-    print(_times(times))
+    if times:
+        print(_times(times))
     if not args.data:
         print("fish_1, ov_plane: skipped: --data FOLDER says where they are")
     return 0
