@@ -6,25 +6,20 @@ import numpy as np
 import pytest
 
 from freelook.color import i420_from_rgb, rgb_from_picture
-from freelook.errors import MissingExtra, RenderError
 from freelook.hud import Box, Lines, place_of, shapes, theme_named
 from freelook.hud.place import Rect
 from freelook.renderers.cpu_pen import CpuPen
-from freelook.renderers.gl_context import open_context
 from freelook.renderers.gl_pen import GlPen
 from freelook.types import ColorSpace, Picture
+from gl_here import gl_context
 from hud_states import STATES
 
 WIDTH, HEIGHT = SIZE = (320, 240)
 
 
 def test_it_draws_what_opengl_draws() -> None:
-    try:
-        context = open_context()
-    except (MissingExtra, RenderError) as error:
-        pytest.skip(f"no OpenGL here: {error}")
     theme, made = theme_named("day"), shapes(STATES["rolled"], place_of(*SIZE))
-    with context:
+    with gl_context() as context:
         frame = context.framebuffer([context.texture(SIZE, 3)])
         frame.use()
         context.clear(0.2, 0.4, 0.8)

@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from freelook.errors import MissingExtra, RenderError
 from freelook.hud import THEMES, Box, Lines, Shape, Text, theme_named
 from freelook.hud.place import Rect
-from freelook.renderers.gl_context import open_context
 from freelook.renderers.gl_pen import GlPen
+from gl_here import gl_context
 
 WIDTH, HEIGHT = SIZE = (96, 64)
 Picture = NDArray[np.uint8]
@@ -23,13 +22,8 @@ Draw = Callable[..., Picture]
 
 @pytest.fixture(scope="module")
 def context() -> Iterator[Any]:
-    try:
-        opened = open_context()
-    except (MissingExtra, RenderError) as error:
-        pytest.skip(f"no OpenGL here: {error}")
-    with opened:
+    with gl_context() as opened:
         yield opened
-    opened.release()
 
 
 @pytest.fixture(scope="module")

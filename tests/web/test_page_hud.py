@@ -11,7 +11,6 @@ import pytest
 from numpy.typing import NDArray
 from page_station import PageView
 
-from freelook.errors import MissingExtra, RenderError
 from freelook.hud import (
     THEMES,
     Box,
@@ -23,8 +22,8 @@ from freelook.hud import (
     theme_named,
 )
 from freelook.hud.letters import make_sheet
-from freelook.renderers.gl_context import open_context
 from freelook.renderers.gl_pen import GlPen
+from gl_here import gl_context
 from hud_states import SIZES, STATES, message
 
 pytestmark = pytest.mark.browser
@@ -73,10 +72,6 @@ def assert_alike(one: Shape, other: dict[str, Any]) -> None:
 @pytest.mark.parametrize("theme", THEMES)
 def test_the_page_draws_the_same_picture(open_page: Any, theme: str) -> None:
     """Both pens over black, the page's with its panels hidden."""
-    try:
-        context = open_context()
-    except (MissingExtra, RenderError) as error:
-        pytest.skip(f"no OpenGL here: {error}")
     state = STATES["rolled"]
     page: PageView = open_page(query="?pixels=400000")
     theirs = canvas(
@@ -90,7 +85,7 @@ def test_the_page_draws_the_same_picture(open_page: Any, theme: str) -> None:
             renderer.pen.end(); }); }""",
         [message(state), theme],
     )
-    with context:
+    with gl_context() as context:
         frame = context.framebuffer([context.texture((WIDTH, HEIGHT), 3)])
         frame.use()
         pen = GlPen(context, theme_named(theme), 1.0)

@@ -18,13 +18,13 @@ from x_screen import XScreen
 
 import video_streams
 from freelook.cli import main
-from freelook.errors import MissingExtra, RenderError, SinkError
-from freelook.renderers.gl_context import open_context
+from freelook.errors import SinkError
 from freelook.rotations import RDF_FROM_FRD, body_from_view
 from freelook.viewport import Viewport
 from freelook.window.flight import AFTER_DAMAGE
 from freelook.window.painting import EyesPainter
 from freelook.window.surface import Monitor, choose_monitor
+from gl_here import gl_context
 
 pytest.importorskip("glfw")
 pytest.importorskip("moderngl")
@@ -69,11 +69,7 @@ class Program:
 
 def off_screen(yaw_deg: float) -> NDArray[np.uint8]:
     """What the screen must show, drawn without one."""
-    try:
-        context = open_context()
-    except (MissingExtra, RenderError) as error:
-        pytest.skip(f"no OpenGL here: {error}")
-    with context:
+    with gl_context() as context:
         target = context.framebuffer([context.texture(SCREEN, 3)])
         painter = EyesPainter(context, OPTICS)
         painter.load(frame().picture, CAMERA, SCREEN, HFOV_DEG)

@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion
 
 from freelook.camera import make_camera
-from freelook.errors import MissingExtra, RenderError, SinkError
+from freelook.errors import SinkError
 from freelook.lens import Equidistant
-from freelook.renderers.gl_context import open_context
 from freelook.renderers.reference import ReferenceRenderer, coordinates
 from freelook.rotations import RDF_FROM_FRD, body_from_view
 from freelook.types import ColorSpace, Picture
 from freelook.viewport import Viewport, fitting
 from freelook.window.eyes import Eye, Layout, Optics, eyes
 from freelook.window.painting import EyesPainter
+from gl_here import gl_context
 
 CAMERA = make_camera((600, 600), Equidistant(180.0), field_deg=188)
 AHEAD = RDF_FROM_FRD * body_from_view(0, 0)
@@ -30,13 +30,8 @@ Rgb = NDArray[np.uint8]
 
 @pytest.fixture(scope="module")
 def context() -> Iterator[Any]:
-    try:
-        opened = open_context()
-    except (MissingExtra, RenderError) as error:
-        pytest.skip(f"no OpenGL here: {error}")
-    with opened:
+    with gl_context() as opened:
         yield opened
-    opened.release()
 
 
 def smooth_picture() -> Picture:

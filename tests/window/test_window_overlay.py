@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 from scene import CAMERA
 
 from freelook.cli import main
-from freelook.errors import MissingExtra, RenderError
+from freelook.errors import RenderError
 from freelook.gimbal import Stabiliser
 from freelook.hud import THEMES, Dial, HudState, LensField, Situation
-from freelook.renderers.gl_context import open_context
 from freelook.rotations import body_from_view
 from freelook.types import Attitude
 from freelook.window.events import Key
 from freelook.window.eyes import Optics
 from freelook.window.overlay import Overlay, RecentAges, Told
 from freelook.window.pilot import Pilot
+from gl_here import gl_context
 
 pytest.importorskip("moderngl")
 
@@ -33,13 +33,8 @@ SECOND = 1_000_000_000
 
 @pytest.fixture(scope="module")
 def context() -> Iterator[Any]:
-    try:
-        opened = open_context()
-    except (MissingExtra, RenderError) as error:
-        pytest.skip(f"no OpenGL here: {error}")
-    with opened:
+    with gl_context() as opened:
         yield opened
-    opened.release()
 
 
 def drawn(context: Any, overlay: Overlay) -> NDArray[np.uint8]:
