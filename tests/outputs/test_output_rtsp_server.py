@@ -53,7 +53,7 @@ def feed_while(sink: Sink, condition: Callable[[], Any]) -> None:
         sink.write(frame(count))
         count += 1
         pause.wait(0.02)
-        assert count < 1500, "still so after 30 s"
+        assert count < 4000, "still so after 80 s and more"
 
 
 def stalling_viewer(port: int) -> socket.socket:
@@ -187,6 +187,7 @@ def test_an_rtsp_viewer_that_stalls(tmp_path: Path, rng: np.random.Generator) ->
 
 
 @needs_gstreamer
+@pytest.mark.timeout(400)  # on a busy machine players take long to begin
 @pytest.mark.parametrize("transport", ["udp", "tcp"])
 def test_a_viewer_that_is_killed(transport: str, tmp_path: Path) -> None:
     """Another one, there all the time, goes on; the one that is gone is forgotten."""
@@ -199,7 +200,7 @@ def test_a_viewer_that_is_killed(transport: str, tmp_path: Path) -> None:
             ffmpeg(pictures[1], *source, count=10**6),
         ):
             feed_while(sink, lambda: not all(picture.exists() for picture in pictures))
-            assert sink.clients == 2
+            feed_while(sink, lambda: sink.clients != 2)
             killed.kill()
             feed_while(sink, lambda: sink.clients > 1)
             pictures[1].unlink()

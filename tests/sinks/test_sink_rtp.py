@@ -83,6 +83,30 @@ def test_nobody_needs_to_listen() -> None:
     assert sink.counters["packets"] >= 3
 
 
+def bound(port: int = 0) -> socket.socket:
+    receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    receiver.bind(("127.0.0.1", port))
+    receiver.settimeout(5)
+    return receiver
+
+
+def test_a_receiver_that_vanishes_and_another_in_its_place() -> None:
+    """The system says of every packet that nobody is there; none of it comes back to the sender."""
+    with bound() as receiver:
+        port = receiver.getsockname()[1]
+        sink = open_sink(f"rtp://127.0.0.1:{port}", size=SIZE, color=COLOR)
+        assert isinstance(sink, RtpStream)
+        sink.write(frame(0))
+        assert receiver.recv(2000)
+    for index in range(1, 32):
+        sink.write(frame(index))
+    assert (sink.counters["sent"], sink.counters["unsent"]) == (32, 0)
+    with bound(port) as receiver:
+        sink.write(frame(32))
+        assert receiver.recv(2000)
+    sink.close()
+
+
 def test_a_receiver_that_asks_gets_a_key_picture() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
         receiver.bind(("127.0.0.1", 0))
