@@ -29,6 +29,8 @@ from gl_here import gl_context
 pytest.importorskip("glfw")
 pytest.importorskip("moderngl")
 
+PATIENCE_S = 150  # a whole flight begins, and ends, on a machine that may be busy
+
 
 @pytest.fixture
 def screen(tmp_path: Path) -> Iterator[XScreen]:
@@ -63,7 +65,7 @@ class Program:
 
     def ended(self) -> tuple[int, str, str]:
         """(exit status, what else it said, errors)"""
-        out, err = self.process.communicate(timeout=30)
+        out, err = self.process.communicate(timeout=PATIENCE_S)
         return self.process.returncode, out, err
 
 
@@ -140,11 +142,12 @@ def flying(screen: XScreen, recording: Path, *options: str) -> Program:
     return Program(screen, *command, "--loop", *options)
 
 
+@pytest.mark.timeout(2 * PATIENCE_S + 60)
 def test_fly_in_a_window_until_q(
     screen: XScreen, recording: Path, wait_until: Callable[..., None]
 ) -> None:
     program = flying(screen, recording, "--monitor", "1", "--tracker", "wander")
-    wait_until(screen.lit, 60, "a picture on the screen")
+    wait_until(screen.lit, PATIENCE_S, "a picture on the screen")
     screen.press("q")
     status, out, err = program.ended()
     assert (status, err) == (0, "")
@@ -155,11 +158,12 @@ def test_fly_in_a_window_until_q(
     assert (screen.picture() == 0).all()  # the window is gone
 
 
+@pytest.mark.timeout(2 * PATIENCE_S + 60)
 def test_a_display_that_goes_away_ends_the_flight_in_order(
     screen: XScreen, recording: Path, wait_until: Callable[..., None]
 ) -> None:
     program = flying(screen, recording)
-    wait_until(screen.lit, 60, "a picture on the screen")
+    wait_until(screen.lit, PATIENCE_S, "a picture on the screen")
     screen.kill()
     status, out, err = program.ended()
     assert status == 2
