@@ -3,22 +3,25 @@ what it tells, its keys, and that a command may choose it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import itertools
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scene import CAMERA
+from scene import CAMERA, frame
 
 from freelook.cli import main
 from freelook.errors import RenderError
 from freelook.gimbal import Stabiliser
 from freelook.hud import THEMES, Dial, HudState, LensField, Situation
+from freelook.mailbox import Mailbox
 from freelook.rotations import body_from_view
-from freelook.types import Attitude
-from freelook.window.events import Key
+from freelook.types import Attitude, Frame
+from freelook.window.events import Event, Key
 from freelook.window.eyes import Optics
+from freelook.window.flight import Flight, Outside
 from freelook.window.overlay import Overlay, RecentAges, Told
 from freelook.window.pilot import Pilot
 from gl_here import gl_context
@@ -87,6 +90,62 @@ def test_both_eyes_see_the_same_lines_each_with_its_shift(context: Any) -> None:
     shifted = np.roll(right, 12, axis=1)  # each six pixels towards the nose
     assert np.abs(left[:, inner].astype(int) - shifted[:, inner]).max() <= 1
     assert (left != left[0, 0]).any()
+
+
+class OffScreen:
+    """A surface without a window, on which one key after the other is pressed."""
+
+    refresh_hz, lost = 0.0, False
+    size_px = size_points = SIZE
+
+    def __init__(self, context: Any, keys: Iterable[str]) -> None:
+        self.context = context
+        self.screen = context.framebuffer([context.texture(SIZE, 3)])
+        self._keys = iter(keys)
+        self.swapped = 0
+
+    def events(self, wait_s: float = 0.0) -> list[Event]:
+        return [Key(key, True) for key in itertools.islice(self._keys, 1)]
+
+    def pad(self) -> None:
+        return None
+
+    def flush(self) -> None:
+        self.context.finish()
+
+    def swap(self) -> None:
+        self.swapped += 1
+
+
+def test_the_lines_have_the_field_of_the_picture(
+    context: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where that is narrower than was wanted, as a map in a window that is too high for it;
+    O takes another projection, for both."""
+    said: list[tuple[str, float, float]] = []
+
+    def note(_overlay: Overlay, state: HudState, size: Any, _target: Any, focal_px: float) -> None:
+        said.append((state.projection, state.hfov_deg, focal_px))
+
+    monkeypatch.setattr(Overlay, "draw", note)
+    frames: Mailbox[Frame] = Mailbox()
+    frames.put(frame())
+    surface = OffScreen(context, ["", "", "", "o", "", "", "", "o", "", "", "", "q"])
+    pilot = Pilot({}, 360.0, projection="equirectangular")
+    flight = Flight(
+        surface,  # type: ignore[arg-type]
+        frames,
+        CAMERA,
+        pilot,
+        Outside(itertools.count(0, SECOND // 100).__next__, lambda: False),
+        hud="day",
+    )
+    flight.run()
+    assert surface.swapped == len(said)
+    (map_, _crop, flat) = dict.fromkeys(said)
+    assert (map_[0], flat[0]) == ("equirectangular", "perspective")
+    assert map_[1:] == pytest.approx((320, 640 / np.radians(320)))
+    assert flat[1:] == pytest.approx((150, 320 / np.tan(np.radians(75))))
 
 
 def test_dials_tell_of_the_last_moments() -> None:

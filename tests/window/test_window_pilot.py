@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from freelook.clock import NS_PER_S
 from freelook.gimbal import Gimbal, GimbalSettings, Stabiliser
 from freelook.head import Head
+from freelook.projections import PROJECTIONS
 from freelook.rotations import angle_between_deg, body_from_view, head_angles_deg
 from freelook.types import Attitude, Counters, Pose
 from freelook.viewport import NARROWEST_DEG, WIDEST_DEG, Viewport
@@ -188,6 +189,29 @@ def test_m_goes_round_the_modes_that_are_possible() -> None:
         pilot.take([Key("m", True), Key("m", False)], 1, SIZE)
         seen.append(stabiliser.mode)
     assert seen == ["horizon", "world", "follow", "body", "horizon"]
+
+
+def test_o_goes_round_the_projections_that_a_window_may_have() -> None:
+    """Each takes the field as far as it goes; drags keep the picture under the mouse in all."""
+    pilot = Pilot({}, 150.0)
+    held(pilot, "-", seconds=3)
+    seen = []
+    for _ in range(len(PROJECTIONS)):
+        assert pilot.take([Key("o", True), Key("o", False)], 1, SIZE) == ["projection"]
+        pilot.take([Drag(1, 0)], 1, SIZE)
+        seen.append(pilot.projection)
+    assert seen == [name for name in PROJECTIONS if name not in ("perspective", "strip")] + [
+        "perspective",
+        "pannini",
+    ]
+    assert pilot.hfov_deg == WIDEST_DEG  # again, after the wider ones
+    held(pilot, "-", seconds=3)
+    pilot.take([Key("o", True), Key("o", True), Key("o", True)], 1, SIZE)
+    assert pilot.projection == "equirectangular"
+    assert pilot.hfov_deg == 240
+    for _ in range(3):
+        pilot.next_projection()
+    assert (pilot.projection, pilot.hfov_deg) == ("pannini", WIDEST_DEG)
 
 
 def test_zooming_leaves_control_where_it_is() -> None:

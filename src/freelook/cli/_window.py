@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 EYES = ("mono", "side-by-side", "top-bottom")
 KEYS = (
     "drag or arrows look, wheel or + and - zoom, R recentres, E eyes front and back, M mode, "
-    "G gives the tracker control again, I lines on and off, U their colours, F full screen, "
-    "Q or Esc ends"
+    "O projection, G gives the tracker control again, I lines on and off, U their colours, "
+    "F full screen, Q or Esc ends"
 )
 
 

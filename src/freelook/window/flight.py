@@ -122,6 +122,9 @@ class Flight:
                 self._overlay.toggle()
             elif asked == "theme":
                 self._overlay.next_theme()
+            elif asked == "projection":
+                self._painter.projection = self._pilot.projection
+                self._redraw = AFTER_DAMAGE
             else:
                 self._surface.toggle_full_screen()
                 self._pacer = Pacer(period_ns(self._surface.refresh_hz), self._pacer.missed)
@@ -180,9 +183,9 @@ class Flight:
         self._painter.paint(self._surface.screen, size, camera, camera_from_view, hfov_deg, grey)
         if self._overlay.on:
             self._surface.flush()  # the view is drawn while the lines over it are being made
-        state = self._hud_of(frame, body_from_view, hfov_deg)
-        focal_px = self._painter.viewport(size, hfov_deg).focal_px
-        self._overlay.draw(state, size, self._surface.screen, focal_px)
+        viewport = self._painter.viewport(size, hfov_deg)  # maybe narrower than was wanted
+        state = self._hud_of(frame, body_from_view, viewport.hfov_deg)
+        self._overlay.draw(state, size, self._surface.screen, viewport.focal_px)
         self._surface.context.finish()
 
     def _note(

@@ -15,7 +15,10 @@ from .eyes import Eye, Optics, eyes
 
 
 class EyesPainter:
-    """Draws the newest picture in one direction for every eye. Its context must be current."""
+    """Draws the newest picture in one direction for every eye. Its context must be current.
+
+    `projection` may change from view to view.
+    """
 
     def __init__(
         self,
@@ -25,7 +28,7 @@ class EyesPainter:
         projection: str = "perspective",
     ) -> None:
         self._context = context
-        self._projection = projection
+        self.projection = projection
         self._optics = Optics() if optics is None else optics
         self._painter = Painter(context, sampling)
         self._viewport = Viewport((4, 4))
@@ -33,7 +36,7 @@ class EyesPainter:
     def viewport(self, size: tuple[int, int], hfov_deg: float) -> Viewport:
         """Of each eye, in a window of this size; no wider than its projection allows there."""
         eye = eyes(self._optics, size)[0]
-        wanted = fitting((eye.width, eye.height), hfov_deg, self._projection)
+        wanted = fitting((eye.width, eye.height), hfov_deg, self.projection)
         if wanted != self._viewport:  # else the same one: what is known of it is kept
             self._viewport = wanted
         return self._viewport

@@ -18,7 +18,7 @@ from ..gimbal import CENTRE, MODES, Stabiliser
 from ..gimbal.easing import Blend, blend
 from ..gimbal.settings import RATE_DEG_S
 from ..head import Head
-from ..projections import projection_named
+from ..projections import PROJECTIONS, projection_named
 from ..rotations import body_from_view, head_angles_deg
 from ..viewport import fitting
 from .events import Damaged, Drag, Event, Key, Left, Pad, Wheel
@@ -34,7 +34,15 @@ STEEP = 0.2  # near straight up or down a drag turns yaw no faster than 1 / STEE
 
 LOOKS = {"left": (-1, 0), "right": (1, 0), "up": (0, 1), "down": (0, -1)}
 ZOOMS = {"+": -1, "-": 1}
-OTHERS = {"f": ["full screen"], "i": ["lines"], "u": ["theme"], "q": ["quit"], "escape": ["quit"]}
+WINDOWED = tuple(name for name in PROJECTIONS if name != "strip")  # which is lower than a window
+OTHERS = {
+    "f": ["full screen"],
+    "i": ["lines"],
+    "u": ["theme"],
+    "o": ["projection"],
+    "q": ["quit"],
+    "escape": ["quit"],
+}
 
 
 @dataclass(frozen=True)
@@ -97,7 +105,7 @@ class Pilot:
 
     def take(self, events: Iterable[Event], now_ns: int, size: tuple[int, int]) -> list[str]:
         """Turn, zoom, recentre; returns what is for others to do: "full screen", "lines",
-        "theme", "draw again", "quit".
+        "theme", "projection" (it is another one now), "draw again", "quit".
 
         `size` is that of an eye's view in window pixels.
         """
@@ -166,6 +174,12 @@ class Pilot:
         except TrackerError:
             self._stabiliser.set_mode(MODES[0])
 
+    def next_projection(self) -> None:
+        """Of those that windows may have; with the same field, as far as its limits let it."""
+        after = WINDOWED.index(self.projection) + 1 if self.projection in WINDOWED else 0
+        self.projection = WINDOWED[after % len(WINDOWED)]
+        self.zoom(1.0)
+
     def give_back(self) -> None:
         """To the tracker that had control before anything was touched, if there is one."""
         self._by_hand = self._tracker is None
@@ -188,6 +202,8 @@ class Pilot:
             self.next_mode()
         elif key.name == "g":
             self.give_back()
+        elif key.name == "o":
+            self.next_projection()
         return OTHERS.get(key.name, [])
 
     def _drag(self, drag: Drag, now_ns: int, size: tuple[int, int]) -> None:
