@@ -38,6 +38,7 @@ FULL = HudState(
     dials={"head": Dial(23.45, 60.0), "video": Dial(4.25, 9.0)},
 )
 LATE = {"head": Dial(), "video": Dial(1234.5, 3000.0)}
+AHEAD_OF_TIME = {"head": Dial(-0.4, 0.2), "video": Dial(-12.0, -3.0)}  # clocks disagree
 
 
 def attitude(yaw_deg: float, pitch_deg: float, roll_deg: float) -> Rotation:
@@ -51,7 +52,7 @@ STATES = {
     "behind": replace(FULL, body_from_view=body_from_view(-170, 40), dials=LATE),
     "straight up": replace(FULL, body_from_view=body_from_view(0, 90), mode="body"),
     "narrow": replace(FULL, hfov_deg=10.0, world_from_body=attitude(-179.9, 0, 0)),
-    "wide": replace(FULL, hfov_deg=150.0),
+    "wide": replace(FULL, hfov_deg=150.0, dials=AHEAD_OF_TIME),
     "pannini": replace(FULL, hfov_deg=220.0, projection="pannini"),
     "stereographic": replace(FULL, hfov_deg=290.0, projection="stereographic"),
     "all around": replace(

@@ -8,7 +8,6 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from hud_states import CAMERA, FULL, STATES, attitude
 
 from freelook.errors import RenderError
 from freelook.hud import (
@@ -33,6 +32,7 @@ from freelook.hud.words import bearing, capitals, compass, shortened, tenths
 from freelook.lens import Floats
 from freelook.rotations import FRD_FROM_RDF, body_from_view
 from freelook.viewport import Viewport
+from hud_states import CAMERA, FULL, STATES, attitude
 
 SIZE = (640, 360)
 
@@ -213,6 +213,7 @@ def test_letters_differ_and_are_where_they_should_be() -> None:
         (tenths(4.25), "4.3"),
         (tenths(99.5), "100"),
         (tenths(1500), "1.5S"),
+        (tenths(-0.4), "0.0"),
         (capitals("Tür µ"), "T?R ?"),
         (shortened("A LONG ONE", 7), "A LONG…"),
     ],

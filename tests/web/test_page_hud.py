@@ -201,6 +201,59 @@ def test_the_horizon_is_the_worlds_once_its_attitude_is_known(open_page: Any) ->
     assert page.js("freelook.app.screen.world") == pytest.approx(world)
 
 
+def test_a_frame_that_came_before_its_message_keeps_the_horizon(open_page: Any) -> None:
+    """Until there is word of it, when it is drawn anew."""
+    page: PageView = open_page()
+    one, two = (message(STATES[name])["world"] for name in ("rolled", "all around"))
+    took = page.js(
+        """([one, two]) => { const { app } = freelook, seen = [];
+        const tell = (rtp, world) => app.link.receive(
+            JSON.stringify({ type: 'frame', rtp, arrival: rtp, world }), performance.now());
+        const look = () => { seen.push([app.screen.world, app.scheduled !== 0]); app.drawNow(); };
+        const show = (rtp) => { app.shownRtp = rtp; app.takeBase(); };
+        app.drawNow();
+        tell(1, one); show(1); look();
+        show(2); look();
+        tell(2, two); look();
+        tell(3); show(3); look();
+        return seen; }""",
+        [one, two],
+    )
+    assert [drawn_anew for _, drawn_anew in took] == [True, False, True, True]
+    worlds = [world for world, _ in took]
+    assert worlds[0] == worlds[1] == pytest.approx(one)
+    assert worlds[2] == pytest.approx(two)
+    assert worlds[3] is None
+
+
+def test_what_makes_no_sense_is_not_taken(open_page: Any) -> None:
+    """From the station, and from what the page remembers: readings go on."""
+    page: PageView = open_page()
+    status = {"type": "status", "source": {"state": "live", "message": ""}, "viewers": 1}
+    recording = {"state": "live", "shown": 77}
+    for broken in (
+        {"trackers": [], "recordings": 5},
+        {"trackers": [], "recordings": [None]},
+        {"trackers": [None]},
+    ):
+        page.message(**status, **broken)  # type: ignore[arg-type]
+    assert page.js("freelook.app.link.status") is None
+    page.message(**status, trackers=[], recordings=[recording])  # type: ignore[arg-type]
+    page.shows("REC 77")
+    page.message(type="frame", rtp=1, arrival=1, world=[None, "x", {}, 1e999])
+    names = ["constructor", "dusk", None, 5]
+    drawn = page.js(
+        """names => { const { app } = freelook; return names.map((name) => {
+        app.settings.set('hud', name); app.settings.set('panels', false);
+        app.screen.told = { ...app.screen.told, warnings: [{ level: 'x', text: 5 }],
+            dials: { head: { median: -0.4, p95: null } } };
+        app.screen.drawnKey = ''; app.drawNow();
+        return app.renderer.gl.getError(); }); }""",
+        names,
+    )
+    assert drawn == [0] * len(names)
+
+
 def test_keys_change_the_theme_and_hide_the_panels(view: PageView) -> None:
     controls = view.page.locator("#controls")
     assert view.js("freelook.app.settings.get('hud')") == THEMES[0]

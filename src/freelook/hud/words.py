@@ -34,7 +34,9 @@ def compass(heading_deg: float) -> str:
 
 
 def tenths(value: float) -> str:
-    """Milliseconds: with a decimal below 10; from a second on, seconds."""
+    """Milliseconds, 0 where clocks disagree by more: with a decimal below 10; from a second on,
+    seconds."""
+    value = max(value, 0.0)
     if value >= 999.5:
         return f"{tenths(value / 1000)}S"
     if value >= 10:

@@ -145,9 +145,14 @@ export class App {
     if (rtp === this.shownRtp) this.takeBase(); // it was drawn before we knew
   }
 
-  /** Heads turn in the base of the frame that is shown. */
+  /** Heads turn in the base of the frame that is shown, and the horizon is that of its time; of the
+   * one before until there is word of it. */
   takeBase() {
-    this.screen.world = this.link.worldOf(this.shownRtp);
+    const world = this.link.worldOf(this.shownRtp);
+    if (world !== undefined && String(world) !== String(this.screen.world)) {
+      this.screen.world = world;
+      this.wake();
+    }
     const base = this.link.baseOf(this.shownRtp);
     if (!base || base.join() === this.command.base.join()) return;
     this.command.base = base;

@@ -31,9 +31,10 @@ export function compass(headingDeg) {
   return QUARTERS[number] ?? String(number);
 }
 
-/** Milliseconds: with a decimal below 10; from a second on, seconds.
+/** Milliseconds, 0 where clocks disagree by more: with a decimal below 10; from a second on, seconds.
  * @param {number} value @returns {string} */
 export function tenths(value) {
+  if (value < 0) return tenths(0);
   if (value >= 999.5) return `${tenths(value / 1000)}S`;
   if (value >= 10) return String(whole(value));
   const number = whole(10 * value);
@@ -41,7 +42,7 @@ export function tenths(value) {
 }
 
 /** As far as there are letters for it. @param {Definition} known @param {string} text */
-export const capitals = (known, text) => [...text.toUpperCase()]
+export const capitals = (known, text) => [...String(text).toUpperCase()]
   .map((letter) => (letter === ' ' || letter in known.letters ? letter : '?')).join('');
 
 /** @param {string} text @param {number} most letters */

@@ -127,7 +127,8 @@ export class Link {
 
   /** @param {any} message */
   setStatus(message) {
-    if (!message.source || !Array.isArray(message.trackers)) return false;
+    const { source, trackers, recordings = [] } = message;
+    if (!source || !areObjects(trackers) || !areObjects(recordings)) return false;
     this.status = message;
     return true;
   }
@@ -138,10 +139,11 @@ export class Link {
     return rtp === null ? this.newestBase : this.bases.get(rtp) ?? null;
   }
 
-  /** The vehicle's attitude in a frame, as `baseOf`. @param {number | null} rtp
-   * @returns {Quaternion | null} */
+  /** The vehicle's attitude in a frame, null where the station does not know it; undefined for a
+   * frame that was not told about yet. @param {number | null} rtp
+   * @returns {Quaternion | null | undefined} */
   worldOf(rtp) {
-    return rtp === null ? this.newestWorld : this.worlds.get(rtp) ?? null;
+    return rtp === null ? this.newestWorld : this.worlds.get(rtp);
   }
 
   /** When the frame came to the station, page time; null if not known.
@@ -150,6 +152,10 @@ export class Link {
     return rtp === null ? null : this.clock.pageMs(this.arrivals.get(rtp));
   }
 }
+
+/** @param {unknown} list */
+const areObjects = (list) => Array.isArray(list)
+  && list.every((one) => one !== null && typeof one === 'object');
 
 /** @param {unknown} text @returns {any} */
 function parsed(text) {

@@ -41,7 +41,8 @@ export class Pen {
    * @param {string} theme */
   begin(ratio, theme) {
     const { gl, known } = this;
-    const wanted = known.themes[theme] ?? this.theme;
+    // a page that remembers a theme there is no more goes on with another
+    const wanted = Object.hasOwn(known.themes, theme) ? known.themes[theme] : this.theme;
     if (ratio !== this.ratio || wanted !== this.theme) this.forget();
     [this.ratio, this.theme] = [ratio, wanted];
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
