@@ -262,7 +262,8 @@ def test_a_password_is_made_up_where_one_is_needed() -> None:
     assert re.fullmatch(r"rtsp-server://pilot:[\w-]{16}@0\.0\.0\.0:8554/view", made)
     assert secured("rtsp-server://0.0.0.0:8554/view") != made
     assert invitation(made) == made.replace("rtsp-server", "rtsp")
-    for address in ("rtsp-server://127.0.0.1:8554", "rtsp-server://a:b@0.0.0.0:1", made):
+    given = [f"rtsp-server://{who}@0.0.0.0:1" for who in ("a:b", "a", "a:", ":b")]
+    for address in ("rtsp-server://127.0.0.1:8554", made, *given):
         assert secured(address) == address
 
 

@@ -75,3 +75,22 @@ def test_mistakes_say_what_and_what_else(text: str, why: str) -> None:
     with pytest.raises(SinkError, match=r"(?s)^--show ") as raised:
         parse(text)
     assert why in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "stream:{},size=640",
+        "stream:{},fps=5,fps=6",
+        "stream:{},fast",
+        "stream:{},overwrite",
+        "screen:{}",
+        "page:{}",
+        "stream:{},hud=on,layout=pip",
+    ],
+)
+def test_mistakes_are_told_without_passwords(text: str) -> None:
+    with pytest.raises(SinkError, match="://host:8554/view") as raised:
+        parse(text.format("rtsp://pilot:secret@host:8554/view"))
+    assert "pilot" not in str(raised.value)
+    assert "secret" not in str(raised.value)

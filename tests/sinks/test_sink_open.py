@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from freelook.color import i420_from_rgb
+from freelook.datagrams import free_port
 from freelook.errors import SinkError
 from freelook.sinks import find, modules, open_sink
 from freelook.types import ColorSpace, Frame
@@ -98,3 +102,32 @@ def test_settings_that_make_no_sense_are_refused(tmp_path: Path) -> None:
     for argument in ("rtp://127.0.0.1", "rtp://:5004", "rtp://127.0.0.1:99999", "rtp://["):
         with pytest.raises(SinkError, match="host and port"):
             open_sink(argument, size=SIZE)
+
+
+@pytest.mark.parametrize(
+    "argument",
+    [
+        "rtsp://pilot:secret@127.0.0.1:{}/view",
+        "whip+http://pilot:secret@127.0.0.1:{}/view",
+        "rtsp://pilot:secret@127.0.0.1",
+        "whip+http://pilot:secret@",
+        "rtsp-server://pilot:secret@127.0.0.1",
+        "gopher://pilot:secret@127.0.0.1",
+    ],
+)
+def test_passwords_are_not_told(argument: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither in what went wrong nor in commands, which other users of the machine can see."""
+    commands: list[str] = []
+
+    class Noted(subprocess.Popen[bytes]):
+        def __init__(self, command: list[str], **options: Any) -> None:
+            commands.extend(command)
+            super().__init__(command, **options)
+
+    monkeypatch.setattr(subprocess, "Popen", Noted)
+    with pytest.raises(SinkError) as raised:
+        open_sink(argument.format(free_port()), size=(64, 48))
+    assert "secret" not in " ".join([str(raised.value), *commands])
+    if "{}" in argument:
+        assert sys.executable in commands
+        assert "127.0.0.1" in str(raised.value)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import TracebackType
 
+from ..addresses import without_password
 from ..camera import Camera
 from ..clock import Clock, now_ns
 from ..errors import SinkError
@@ -184,7 +185,8 @@ def sink_argument(spec: OutputSpec) -> str:
         return f"{SINKS[spec.kind]}:{spec.argument}"
     module, _ = find(spec.argument)
     if module.KIND not in STREAMS:
-        raise SinkError(f"{spec.argument} is no live stream; for files there is file:PATH")
+        address = without_password(spec.argument)
+        raise SinkError(f"{address} is no live stream; for files there is file:PATH")
     return spec.argument
 
 

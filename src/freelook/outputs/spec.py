@@ -39,7 +39,7 @@ class OutputSpec:
     """One `--show`. What is None was not said.
 
     `look_deg` is (yaw, pitch, roll) of a view that follows no head; `rate_hz` views a second,
-    else one for every frame of the video; `text` is as it was written.
+    else one for every frame of the video; `text` is as it was written, but for a password.
     """
 
     kind: str
@@ -69,13 +69,15 @@ def parse(text: str) -> OutputSpec:
     """SinkError says what is wrong with it and what there is."""
     head, options = _split(text)
     kind, _, argument = head.partition(":")
+    text = without_password(text)
     if kind not in KINDS:
         raise SinkError(f"--show {text}: unknown kind '{kind}'; known: {', '.join(KINDS)}")
     needed, allowed = KINDS[kind]
     if needed and not argument:
         raise SinkError(f"--show {text}: say where to: {kind}:{EXAMPLES[kind]}")
+    shown = without_password(argument)
     if argument and not needed and kind != "virtual-camera":
-        raise SinkError(f"--show {text}: {kind} takes no '{argument}'")
+        raise SinkError(f"--show {text}: {kind} takes no '{shown}'")
     for key in options:
         if key not in allowed:
             known = ", ".join(allowed) or "none"
@@ -93,6 +95,7 @@ EXAMPLES = {
 def _split(text: str) -> tuple[str, dict[str, str]]:
     """What comes before the options, and them."""
     head, *parts = text.split(",")
+    text = without_password(text)
     options: dict[str, str] = {}
     for part in parts:
         key, equals, value = part.partition("=")

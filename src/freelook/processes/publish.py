@@ -1,6 +1,8 @@
 """Publishes the coded pictures from its input (see sinks/_child.py) to an RTSP server.
 
-python -m freelook.processes.publish URL h264|hevc WIDTH HEIGHT
+python -m freelook.processes.publish h264|hevc WIDTH HEIGHT
+
+The address is in the environment (FREELOOK_ADDRESS), as there may be a password in it.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ from av.container import OutputContainer
 from av.error import FFmpegError
 from av.stream import Stream
 
-from ..sinks._child import HEADER
+from ..sinks._child import ADDRESS, HEADER
 
 CLOCK_HZ = 90_000
 OPTIONS = {"rtsp_transport": "tcp", "timeout": "5000000"}  # microseconds
@@ -50,4 +52,4 @@ def publish(pipe: BinaryIO, container: OutputContainer, stream: Stream) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main(*sys.argv[1:]))
+    sys.exit(main(os.environ[ADDRESS], *sys.argv[1:]))

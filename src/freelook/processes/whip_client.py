@@ -1,6 +1,8 @@
 """Publishes the coded pictures from its input (see sinks/_child.py) by WHIP (RFC 9725).
 
-python -m freelook.processes.whip_client URL
+python -m freelook.processes.whip_client
+
+The address is in the environment (FREELOOK_ADDRESS), as there may be a password in it.
 """
 
 from __future__ import annotations
@@ -24,7 +26,8 @@ from aiortc import (
 from aiortc.mediastreams import MediaStreamError
 from yarl import URL
 
-from ..sinks._child import HEADER
+from ..addresses import without_password
+from ..sinks._child import ADDRESS, HEADER
 
 CLOCK_HZ = 90_000
 CONNECT_S = 15.0
@@ -142,12 +145,16 @@ def main(url: str) -> int:
     try:
         asyncio.run(publish(url))
     except (aiohttp.ClientError, OSError, TimeoutError) as error:
-        print(str(error) or "the server does not answer", file=sys.stderr, flush=True)
+        print(
+            without_password(str(error)) or "the server does not answer",
+            file=sys.stderr,
+            flush=True,
+        )
         return 1
     return 0
 
 
 if __name__ == "__main__":
-    status = main(*sys.argv[1:])
+    status = main(os.environ[ADDRESS])
     sys.stderr.flush()
     os._exit(status)  # the thread that waits at the pipe would be in the way of an orderly end

@@ -17,6 +17,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Literal
 
+from ..addresses import without_password
 from ..errors import SinkError
 from ..plugins import modules_by_kind
 from ..types import ColorSpace, Sink
@@ -111,7 +112,8 @@ def _recognise(argument: str, kinds: Mapping[str, ModuleType]) -> ModuleType:
         f"  {kind + ':':<9} {(module.__doc__ or '').splitlines()[0]}"
         for kind, module in kinds.items()
     )
-    raise SinkError(f"do not know how to write '{argument}'; outputs are:\n{rows}")
+    shown = without_password(argument)
+    raise SinkError(f"do not know how to write '{shown}'; outputs are:\n{rows}")
 
 
 def check_output_file(argument: str, *, overwrite: bool) -> Path:

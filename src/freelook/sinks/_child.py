@@ -22,6 +22,7 @@ from ..errors import SinkError
 from ..types import AccessUnit
 
 PROCESSES = "freelook.processes"  # the package of those that are ours
+ADDRESS = "FREELOOK_ADDRESS"  # in the environment of those that need one
 HEADER = struct.Struct(">QBI")
 READY_S = 10.0
 FULL_S = 1.0  # a pipe that stays full so long belongs to a program that hangs
@@ -31,8 +32,9 @@ LAST_LINES = 4
 
 class Child:
     """Started at once; `wait_ready` before the first `send`. SinkError, with the program's last
-    words, when it ended or takes nothing any more. `secrets` go by the environment, which other
-    users of the machine cannot see, as they do a command."""
+    words, when it ended or takes nothing any more; it begins with `argument`, which has no password
+    in it. `secrets` go by the environment, which other users of the machine cannot see, as they do
+    a command."""
 
     def __init__(
         self,

@@ -6,6 +6,7 @@ import socket
 from collections.abc import Iterator
 from urllib.parse import urlsplit
 
+from ..addresses import without_password
 from ..clock import NS_PER_S
 from ..errors import RenderError, SinkError
 from ..media.encoder import Encoder
@@ -108,5 +109,6 @@ def host_and_port(argument: str) -> tuple[str, int]:
     except ValueError:
         host = port = None
     if not host or not port:
-        raise SinkError(f"{argument}: give host and port, like {scheme}://127.0.0.1:5004")
+        shown = without_password(argument)
+        raise SinkError(f"{shown}: give host and port, like {scheme}://127.0.0.1:5004")
     return host, port

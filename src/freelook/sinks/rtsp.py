@@ -5,10 +5,11 @@ from __future__ import annotations
 import sys
 from urllib.parse import urlsplit
 
+from ..addresses import without_password
 from ..errors import SinkError
 from ..types import Frame, Sink
 from . import SinkSettings, refuse
-from ._child import PROCESSES, Child
+from ._child import ADDRESS, PROCESSES, Child
 from ._live import LiveEncoder
 
 KIND = "rtsp"
@@ -29,7 +30,8 @@ def check(argument: str, settings: SinkSettings) -> None:
     except ValueError:
         complete = None
     if not complete:
-        raise SinkError(f"{argument}: give host and name, like rtsp://127.0.0.1:8554/view")
+        shown = without_password(argument)
+        raise SinkError(f"{shown}: give host and name, like rtsp://127.0.0.1:8554/view")
 
 
 def open(argument: str, settings: SinkSettings) -> Sink:
@@ -47,11 +49,12 @@ class Published:
     """
 
     def __init__(self, argument: str, settings: SinkSettings) -> None:
-        self._encoder = LiveEncoder(argument, settings)
+        shown = without_password(argument)
+        self._encoder = LiveEncoder(shown, settings)
         self.counters = self._encoder.counters
         width, height = map(str, settings.size)
-        command = [sys.executable, "-m", PUBLISH, argument, self._encoder.codec, width, height]
-        self._child = Child(argument, command)
+        command = [sys.executable, "-m", PUBLISH, self._encoder.codec, width, height]
+        self._child = Child(shown, command, secrets={ADDRESS: argument})
         try:
             self._child.wait_ready()
         except SinkError:

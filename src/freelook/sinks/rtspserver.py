@@ -43,13 +43,14 @@ def recognises(argument: str) -> bool:
 def check(argument: str, settings: SinkSettings) -> None:
     refuse(settings, "RTSP, which has its own way to describe itself,", "sdp")
     _who_may(argument)
-    _needed_python(argument)
+    _needed_python(without_password(argument))
 
 
 def secured(argument: str) -> str:
-    """With a password made up, where other machines reach the server and none was given."""
+    """With a password made up, where other machines reach the server and nothing was said about
+    who may."""
     host, _ = host_and_port(argument)
-    if _given(argument) or is_loopback(host):
+    if "@" in urlsplit(argument).netloc or is_loopback(host):
         return argument
     who = f"{MADE_UP_USER}:{secrets.token_urlsafe(12)}"
     return argument.replace("://", f"://{who}@", 1)
@@ -129,11 +130,6 @@ def python_with_gstreamer() -> str | None:
         if run.returncode == 0:
             return python
     return None
-
-
-def _given(argument: str) -> bool:
-    url = urlsplit(argument)
-    return bool(url.username and url.password)
 
 
 def _who_may(argument: str) -> dict[str, str]:

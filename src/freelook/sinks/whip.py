@@ -6,10 +6,11 @@ import sys
 from importlib import import_module
 from urllib.parse import urlsplit
 
+from ..addresses import without_password
 from ..errors import SinkError
 from ..types import Frame, Sink
 from . import SinkSettings, refuse
-from ._child import PROCESSES, Child
+from ._child import ADDRESS, PROCESSES, Child
 from ._live import LiveEncoder
 
 KIND = "whip"
@@ -25,16 +26,15 @@ def recognises(argument: str) -> bool:
 
 def check(argument: str, settings: SinkSettings) -> None:
     refuse(settings, "WHIP, which has its own way to describe itself,", "sdp")
+    shown = without_password(argument)
     if settings.codec != "h264":
-        raise SinkError(f"{argument}: WebRTC takes H.264 everywhere, and H.265 hardly anywhere")
+        raise SinkError(f"{shown}: WebRTC takes H.264 everywhere, and H.265 hardly anywhere")
     try:
         host = urlsplit(argument).hostname
     except ValueError:
         host = None
     if not host:
-        raise SinkError(
-            f"{argument}: give host and path, like whip+http://127.0.0.1:8889/view/whip"
-        )
+        raise SinkError(f"{shown}: give host and path, like whip+http://127.0.0.1:8889/view/whip")
     import_module("aiortc")  # a missing one is noticed before the flight
     import_module("aiohttp")
 
@@ -53,10 +53,12 @@ class WhipStream:
     """
 
     def __init__(self, argument: str, settings: SinkSettings) -> None:
-        self._encoder = LiveEncoder(argument, settings)
+        shown = without_password(argument)
+        self._encoder = LiveEncoder(shown, settings)
         self.counters = self._encoder.counters
-        url = argument.removeprefix("whip+")
-        self._child = Child(argument, [sys.executable, "-m", WHIP_CLIENT, url], self._heard)
+        address = {ADDRESS: argument.removeprefix("whip+")}
+        command = [sys.executable, "-m", WHIP_CLIENT]
+        self._child = Child(shown, command, self._heard, address)
         try:
             self._child.wait_ready(CONNECT_S)
         except SinkError:
