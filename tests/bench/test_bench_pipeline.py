@@ -255,6 +255,15 @@ def test_rows_tell_medians_and_the_start_apart() -> None:
     assert row.cpu_ms == pytest.approx(30)
 
 
+@pytest.mark.parametrize(
+    ("frames", "spent_s"), [(1, 2.0), (5, 1.0)], ids=["one frame", "no longer than one"]
+)
+def test_what_is_too_short_tells_nothing_without_the_start(frames: int, spent_s: float) -> None:
+    row = Row(FIXED, "veryfast", "a way", frames, [spent_s], [spent_s], [1.0], [1.0])
+    assert np.isnan([row.running_frames_per_s, row.cpu_ms]).all()
+    assert row.frames_per_s == frames / spent_s
+
+
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """One made-up row for each course, one way skipped."""
@@ -299,6 +308,7 @@ def test_the_command_prints_json(
     ("options", "said"),
     [
         (["--preset", "quick"], "unknown preset 'quick'; known: ultrafast"),
+        (["--size", "640x361"], "640x361: both must be even"),
         (["--repeat", "0"], "at least 1"),
         (["--seconds", "-1"], "above 0"),
         (["--lens", "demo"], "for a CLIP of yours"),

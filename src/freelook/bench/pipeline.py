@@ -112,15 +112,18 @@ class Row:
 
     @property
     def running_frames_per_s(self) -> float:
-        """Without the start: what a long recording comes to."""
+        """Without the start: what a long recording comes to. NaN where the clip is too short to
+        tell."""
         running = float(np.median(self.wall_s) - np.median(self.start_s))
-        return (self.frames - 1) / running if running > 0 else float("nan")
+        return (self.frames - 1) / running if running > 0 and self.frames > 1 else float("nan")
 
     @property
     def cpu_ms(self) -> float:
-        """Processor time of a frame, without the start."""
+        """Processor time of a frame, without the start. NaN as above."""
         running = float(np.median(self.cpu_s) - np.median(self.start_cpu_s))
-        return 1e3 * running / max(1, self.frames - 1)
+        return (
+            1e3 * running / (self.frames - 1) if running > 0 and self.frames > 1 else float("nan")
+        )
 
 
 def run(plan: Plan, folder: Path, on_step: Callable[[], None] = lambda: None) -> Iterator[Row]:

@@ -102,6 +102,8 @@ def _check(args: argparse.Namespace) -> None:
     for preset in args.preset.split(","):
         if preset not in PRESETS:
             raise FreelookError(f"unknown preset '{preset}'; known: {', '.join(PRESETS)}")
+    if any(side % 2 for side in args.size):
+        raise FreelookError(f"--size {args.size[0]}x{args.size[1]}: both must be even, for x264")
     if args.repeat < 1:
         raise FreelookError(f"--repeat {args.repeat}: at least 1")
     if args.seconds is not None and not 0 < args.seconds < 86_400:
@@ -225,25 +227,30 @@ def _print(plan: Plan, rows: list[Row], notes: list[str]) -> None:
         table.add_column("way", no_wrap=True)
         for column in ("frames/s", "freelook is", "without start", "CPU ms", "PSNR"):
             table.add_column(column, justify="right")
-        for row in rows:
-            if (row.course, row.preset) == (course, preset):
-                table.add_row(*_cells(row, rows, clip.frames))
+        here = [row for row in rows if (row.course, row.preset) == (course, preset)]
+        for row in here:
+            table.add_row(*_cells(row, rows, clip.frames))
         console.print(table)
+        for row in here:
+            if row.skipped:
+                print(f"{row.way}: skipped: {row.skipped}")
     for note in notes:
         print(note)
 
 
 def _cells(row: Row, rows: list[Row], frames: int) -> list[str]:
     if row.skipped:
-        return [f"{row.way}\n  skipped: {row.skipped}"]
-    psnr = f"{row.psnr_db:.1f}" if isfinite(row.psnr_db) else ""
-    ratio = _ratio(row, rows)
+        return [row.way, "skipped"]
     written = "" if row.frames == frames else f"\n  wrote {row.frames} frames"
     return [
         row.way + written,
-        f"{row.frames_per_s:.1f}",
-        f"{ratio:.2f} x" if isfinite(ratio) else "",
-        f"{row.running_frames_per_s:.1f}",
-        f"{row.cpu_ms:.1f}",
-        psnr,
+        _figure(row.frames_per_s),
+        _figure(_ratio(row, rows), ".2f", " x"),
+        _figure(row.running_frames_per_s),
+        _figure(row.cpu_ms),
+        _figure(row.psnr_db),
     ]
+
+
+def _figure(value: float, form: str = ".1f", unit: str = "") -> str:
+    return f"{value:{form}}{unit}" if isfinite(value) else ""
