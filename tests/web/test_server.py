@@ -35,6 +35,7 @@ def test_station_describes_its_camera() -> None:
     async def test(station: Bench) -> None:
         async with station.http.get(station.base + "/api/station") as reply:
             about = await reply.json()
+        assert about["source"] == "rtsp://camera/scripted"  # viewers need no camera's password
         assert about["trackers"] == ["script"]
         assert about["camera"]["size"] == [960, 960]
         assert len(about["camera"]["g"]) == 256

@@ -212,7 +212,7 @@ class Bench:
             Ingest(self._open, retry_s=(0.05, 0.1)),
             load_camera("demo"),
             {name: Head(name, tracker) for name, tracker in heads.items()},
-            About("scripted"),
+            About("rtsp://pilot:secret@camera/scripted"),
             **options,
         )
         self.base = ""

@@ -13,6 +13,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from .. import __version__
+from ..addresses import without_password
 from ..camera import Camera
 from ..clock import Clock, now_ns
 from ..gimbal import MODES, Aim, GimbalSettings, Stabiliser
@@ -108,7 +109,7 @@ class Station:
         """GET /api/station."""
         return {
             "version": __version__,
-            "source": self._about.source,
+            "source": without_password(self._about.source),
             "demo": self._about.demo,
             "camera": messages.camera_table(self._camera),
             "trackers": list(self._heads),
