@@ -60,6 +60,13 @@ class Late:
         yield 10**12, ((t, None if i % 4 == 1 else t - 40_000_000) for i, t in enumerate(times))
 
 
+class Broken(Late):
+    name = "broken"
+
+    def ready(self) -> nullcontext[None]:
+        raise FreelookError("fell off the table")
+
+
 class Absent(Late):
     name = "absent"
 
@@ -73,9 +80,10 @@ def test_streams_are_told_by_receiver(
     stream = nullcontext(Stream("udp", "udp://127.0.0.1:9", 9, Path()))
     monkeypatch.setenv("COLUMNS", "120")  # nothing is broken into lines
     monkeypatch.setattr(streams, "stamped", lambda *_: stream)
-    monkeypatch.setattr(streams, "RECEIVERS", (Late(), Absent()))
+    monkeypatch.setattr(streams, "RECEIVERS", (Broken(), Late(), Absent()))
     assert main(["bench", "streams", "--seconds", "10", "--json"]) == 0
-    late, absent = json.loads(capsys.readouterr().out)
+    broken, late, absent = json.loads(capsys.readouterr().out)
+    assert broken == {"stream": "udp", "receiver": "broken", "skipped": "fell off the table"}
     assert (late["first_s"], late["p50_ms"], late["p95_ms"]) == (100, 40, 40)
     # 201 pictures in 10 s, and two until a whole one ends it; 51 of them were damaged
     assert late["pictures"] == 201 + 2 - 51 - WARM_UP

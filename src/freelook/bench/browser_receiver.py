@@ -10,6 +10,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
 from ..clock import NS_PER_MS, now_ns
+from ..errors import FreelookError
 from ..latency import BLOCK_PX, time_of
 from .page_latency import FLAGS, browser_path
 from .receivers import SIZE, Seen, Stream
@@ -84,9 +85,12 @@ class Chromium:
 
     @contextmanager
     def receive(self, stream: Stream, seconds: float) -> Iterator[tuple[int, Seen]]:
-        """From when the offer came."""
+        """From when the offer came. FreelookError when none comes."""
         assert self._endpoint is not None
-        offered_ns, offer = self._endpoint.offers.get(timeout=ANSWER_S)
+        try:
+            offered_ns, offer = self._endpoint.offers.get(timeout=ANSWER_S)
+        except queue.Empty:
+            raise FreelookError(f"nothing was offered by WHIP in {ANSWER_S:g} s") from None
         self._endpoint.answers.put(answer(self._page, offer, SIZE[0]))
         yield offered_ns, seen(self._page, seconds)
 

@@ -184,7 +184,7 @@ def raw_pictures(
     try:
         assert process.stdout is not None
         opened: IO[bytes] = process.stdout if pipe is None else _both_ends(pipe)
-        with opened:
+        with opened, process.stdout:
             yield begin_ns, _seen(opened, process, headed=pipe is not None)
     finally:
         end.cancel()

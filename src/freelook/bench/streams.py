@@ -13,6 +13,7 @@ from pathlib import Path
 
 from ..clock import NS_PER_MS, NS_PER_S
 from ..datagrams import free_port
+from ..errors import FreelookError
 from ..sinks.rtspserver import python_with_gstreamer
 from .browser_receiver import Chromium
 from .figures import Figure
@@ -36,17 +37,21 @@ class Row:
 
 
 def run(seconds: float, said: Callable[[str], None] = lambda _: None) -> Iterator[Row]:
-    """Every stream in every receiver, one after the other, for so long each."""
+    """Every stream in every receiver, one after the other, for so long each. What goes wrong with
+    one is said in its row."""
     for receiver in RECEIVERS:
         for kind in receiver.streams:
             said(f"{kind} into {receiver.name} ...")
             row = Row(kind, receiver.name, skipped=receiver.missing() or _unserved(kind))
-            if row.skipped is None:
-                with (
-                    receiver.ready() as where,
-                    stamped(kind, where, seconds + 2 * MORE_S) as stream,
-                ):
-                    _measure(row, receiver, stream, seconds)
+            try:
+                if row.skipped is None:
+                    with (
+                        receiver.ready() as where,
+                        stamped(kind, where, seconds + 2 * MORE_S) as stream,
+                    ):
+                        _measure(row, receiver, stream, seconds)
+            except FreelookError as error:
+                row.skipped = str(error)
             yield row
 
 
@@ -76,7 +81,7 @@ def _measure(row: Row, receiver: Receiver, stream: Stream, seconds: float) -> No
 @contextmanager
 def stamped(kind: str, where: str | None, seconds: float) -> Iterator[Stream]:
     """A process that streams stamped pictures, to `where` if it is brought there; else from when
-    there are pictures to pull."""
+    there are pictures to pull. FreelookError when it does not begin."""
     port = free_port()
     path = "/view" if kind.startswith("rtsp") else ""
     address = where or f"{kind.partition(',')[0]}://127.0.0.1:{port}{path}"
@@ -88,7 +93,7 @@ def stamped(kind: str, where: str | None, seconds: float) -> Iterator[Stream]:
             try:
                 assert camera.stdout is not None
                 if where is None and not camera.stdout.readline():
-                    raise RuntimeError("the stamped camera did not start")
+                    raise FreelookError("the stamped camera did not start")
                 yield Stream(kind, address.replace("rtsp-server", "rtsp"), port, sdp)
             finally:
                 camera.kill()
