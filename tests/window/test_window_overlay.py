@@ -21,7 +21,7 @@ from freelook.rotations import body_from_view
 from freelook.types import Attitude, Frame
 from freelook.window.events import Event, Key
 from freelook.window.eyes import Optics
-from freelook.window.flight import Flight, Outside
+from freelook.window.flight import AFTER_DAMAGE, Flight, Outside
 from freelook.window.overlay import Overlay, RecentAges, Told
 from freelook.window.pilot import Pilot
 from gl_here import gl_context
@@ -45,8 +45,14 @@ def drawn(context: Any, overlay: Overlay) -> NDArray[np.uint8]:
     frame.use()
     context.clear(0.2, 0.4, 0.8)
     overlay.draw(STATE, SIZE, frame, FOCAL_PX)
-    data = np.frombuffer(frame.read(components=3, alignment=1), np.uint8)
+    picture = pixels(frame)
     frame.release()
+    return picture
+
+
+def pixels(frame: Any) -> NDArray[np.uint8]:
+    """(rows from the top, columns, 3)."""
+    data = np.frombuffer(frame.read(components=3, alignment=1), np.uint8)
     return data.reshape(HEIGHT, WIDTH, 3)[::-1]
 
 
@@ -146,6 +152,26 @@ def test_the_lines_have_the_field_of_the_picture(
     assert (map_[0], flat[0]) == ("equirectangular", "perspective")
     assert map_[1:] == pytest.approx((320, 640 / np.radians(320)))
     assert flat[1:] == pytest.approx((150, 320 / np.tan(np.radians(75))))
+
+
+def test_before_the_first_picture_there_are_words(context: Any) -> None:
+    """Until they are switched off; nothing is drawn that says the same as before."""
+    surface = OffScreen(context, [*[""] * 12, "i", *[""] * 12, "q"])
+    pictures = []
+    surface.swap = lambda: pictures.append(pixels(surface.screen))  # type: ignore[method-assign]
+    flight = Flight(
+        surface,  # type: ignore[arg-type]
+        Mailbox(),
+        CAMERA,
+        Pilot({}, 90.0),
+        Outside(itertools.count(0, SECOND // 100).__next__, lambda: False),
+        hud="day",
+    )
+    assert flight.run().views == 0
+    assert len(pictures) == AFTER_DAMAGE + 1
+    assert pictures[0][100:130].max() > 100  # under the place of the tape, which is not drawn
+    assert pictures[0][:88, 200:440].max() == 0
+    assert pictures[-1].max() == 0
 
 
 def test_dials_tell_of_the_last_moments() -> None:

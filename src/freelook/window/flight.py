@@ -135,7 +135,10 @@ class Flight:
         fresh = self._frames.take()
         frame = self._frame = fresh or self._frame
         size, grey = self._surface.size_px, self._grey_at(begun_ns)
-        if frame is None or min(size) < 4:
+        if min(size) < 4:
+            return False
+        if frame is None:
+            self._wait_for_video(begun_ns, size)
             return False
         camera, hfov_deg = self._camera_for(frame), self._pilot.hfov_deg
         if fresh:
@@ -168,6 +171,22 @@ class Flight:
             self.figures.video_age.add(swapped_ns - frame.capture_ns)
             self._overlay.video_ages.add(swapped_ns, swapped_ns - frame.capture_ns)
         return True
+
+    def _wait_for_video(self, now_ns: int, size: tuple[int, int]) -> None:
+        """On black the words of the HUD: what there is to wait for."""
+        hfov_deg, overlay, surface = self._pilot.hfov_deg, self._overlay, self._surface
+        if overlay.is_due(now_ns):
+            overlay.rest(self._told(now_ns), HudState(CENTRE, hfov_deg), size, now_ns)
+        shown = (None, size, overlay.on, overlay.version)
+        if shown == self._shown and not self._redraw:
+            return
+        self._redraw = max(0, self._redraw - 1)
+        surface.screen.use()
+        surface.screen.viewport = (0, 0, *size)
+        surface.context.clear(0.0, 0.0, 0.0, 1.0)
+        overlay.draw(None, size, surface.screen, self._painter.viewport(size, hfov_deg).focal_px)
+        surface.swap()
+        self._shown = shown
 
     def _draw(
         self,

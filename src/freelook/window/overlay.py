@@ -115,13 +115,16 @@ class Overlay:
             self._resting, self._resting_of = pen.ink(shapes(state, place)), new
             self.version += 1
 
-    def draw(self, state: HudState, size: tuple[int, int], target: Any, focal_px: float) -> None:
-        """Over the views of all eyes, in the framebuffer in use."""
+    def draw(
+        self, state: HudState | None, size: tuple[int, int], target: Any, focal_px: float
+    ) -> None:
+        """Over the views of all eyes, in the framebuffer in use; without a state what rests."""
         if not self.on:
             return
         pen = self._pen_for(size)
-        moving = pen.ink(shapes(state, self._place(size, MOVING)))
-        inks = [moving] if self._resting is None else [moving, self._resting]
+        inks = [] if self._resting is None else [self._resting]
+        if state is not None:
+            inks.insert(0, pen.ink(shapes(state, self._place(size, MOVING))))
         for eye in eyes(self._optics, size):
             target.viewport = (eye.x, size[1] - eye.y - eye.height, eye.width, eye.height)
             pen.draw(

@@ -17,7 +17,7 @@ function write(element, text) {
  * @param {Summary} summary @param {string} caption */
 export function showDial(known, name, { median, p95 }, caption) {
   const dial = byId(`dial-${name}`);
-  const share = (/** @type {number | null} */ ms) => 
+  const share = (/** @type {number | null} */ ms) =>
     Math.min(1, (ms ?? 0) / known.dials.full_ms[name]);
   dial.style.setProperty('--median', String(share(median)));
   dial.style.setProperty('--p95', String(share(p95)));
