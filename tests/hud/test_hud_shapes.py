@@ -180,6 +180,7 @@ def test_larger_views_get_larger_letters() -> None:
     assert pixels_per_point((640, 360)) == 1
     assert pixels_per_point((1920, 1080)) == 2
     assert pixels_per_point((1080, 1920)) == 2
+    assert len({pixels_per_point((1920, height)) for height in range(540, 1081)}) == 9
 
 
 def test_letters_differ_and_are_where_they_should_be() -> None:

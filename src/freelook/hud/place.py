@@ -8,6 +8,7 @@ from .definition import definition
 
 POINTS_HIGH = 540  # of a view's shorter side: larger ones get larger letters
 MOST_PER_POINT = 8.0
+STEPS_PER_POINT = 8  # a window that is being resized needs new letters only now and then
 
 MOVING = ("horizon", "edge", "tape", "field")
 RESTING = ("state", "dials", "warnings")
@@ -39,7 +40,8 @@ class Place:
 
 def pixels_per_point(size: tuple[int, int]) -> float:
     """Of a view of this size in pixels; 1 at least."""
-    return min(max(min(size) / POINTS_HIGH, 1.0), MOST_PER_POINT)
+    ratio = round(STEPS_PER_POINT * min(size) / POINTS_HIGH) / STEPS_PER_POINT
+    return min(max(ratio, 1.0), MOST_PER_POINT)
 
 
 def place_of(
