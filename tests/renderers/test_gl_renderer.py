@@ -10,7 +10,6 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from gl_here import gl_renderer
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -28,6 +27,7 @@ from freelook.renderers.reference import coordinates as exact_coordinates
 from freelook.rotations import RDF_FROM_FRD, body_from_view
 from freelook.types import ColorSpace, Picture
 from freelook.viewport import Viewport
+from gl_here import gl_renderer
 
 SIDE = 600
 CAMERA = make_camera((SIDE, SIDE), Equidistant(180.0), field_deg=188)

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gl_here import gl_renderer
 from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion
 from scipy.spatial.transform import Rotation
@@ -27,6 +26,7 @@ from freelook.simulation.camera import SimulatedCamera
 from freelook.simulation.world import World
 from freelook.types import ColorSpace, Picture
 from freelook.viewport import Viewport
+from gl_here import gl_renderer
 
 CAMERAS = {
     "round": make_camera((1000, 800), KannalaBrandt(220.0, -0.01, 0.004), field_deg=190),

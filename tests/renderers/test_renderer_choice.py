@@ -6,13 +6,13 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from gl_here import gl_renderer
 
 from freelook import doctor, egl
 from freelook.errors import MissingExtra, RenderError
 from freelook.renderers.choice import Choice, GlDevice, Wanted, choose, open_renderer
 from freelook.renderers.cpu import CpuRenderer
 from freelook.renderers.gl import GlRenderer
+from gl_here import gl_renderer
 
 REAL = GlDevice(1, "NVIDIA H100 80GB HBM3/PCIe/SSE2")
 SOFTWARE = GlDevice(0, "llvmpipe (LLVM 15.0.6, 256 bits)")

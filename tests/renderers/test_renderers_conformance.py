@@ -7,7 +7,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from gl_here import gl_renderer
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -20,6 +19,7 @@ from freelook.renderers.reference import coordinates as exact_coordinates
 from freelook.rotations import RDF_FROM_FRD, body_from_view
 from freelook.types import ColorSpace, Layout, Picture, Plane
 from freelook.viewport import Viewport
+from gl_here import gl_renderer
 from lens_examples import ALL, Example
 
 VIEWS = [Viewport((128, 72), 40.0), Viewport((128, 72), 110.0)]

@@ -236,9 +236,9 @@ def test_what_makes_no_sense_is_not_taken(open_page: Any) -> None:
         {"trackers": [], "recordings": [None]},
         {"trackers": [None]},
     ):
-        page.message(**status, **broken)  # type: ignore[arg-type]
+        page.message(**status, **broken)
     assert page.js("freelook.app.link.status") is None
-    page.message(**status, trackers=[], recordings=[recording])  # type: ignore[arg-type]
+    page.message(**status, trackers=[], recordings=[recording])
     page.shows("REC 77")
     page.message(type="frame", rtp=1, arrival=1, world=[None, "x", {}, 1e999])
     names = ["constructor", "dusk", None, 5]

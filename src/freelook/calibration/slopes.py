@@ -215,7 +215,7 @@ def _radius(lens: Lens, theta: Floats) -> Floats:
 
 
 def _offset(lens: Lens, theta: Floats, around: Floats) -> Floats:
-    return lens.offset(_within(lens, theta), around)  # type: ignore[attr-defined, no-any-return]
+    return lens.offset(_within(lens, theta), around)  # type: ignore[attr-defined]
 
 
 @cache
