@@ -104,8 +104,9 @@ class XScreen:
     def lit(self) -> bool:
         """Whether anything but black is in the middle of the screen; cheaper than a picture."""
         with self._file.open("rb") as file:
-            file.seek(self._file.stat().st_size // 2)
-            return bool(np.frombuffer(file.read(2048), np.uint8).max() > 50)
+            file.seek(self._file.stat().st_size // 8 * 4)
+            bgrx = np.frombuffer(file.read(2048), np.uint8).reshape(-1, 4)
+            return bool(bgrx[:, :3].max() > 50)  # the fourth byte is 255 in a black window too
 
     def press(self, key: str, *, release: bool = True) -> None:
         """On the window, as the server would tell it of a keyboard's."""
