@@ -33,6 +33,7 @@ def test_an_unknown_argument_lists_the_known_kinds(argument: str) -> None:
     for kind in modules():
         assert f"  {kind}: " in str(caught.value)
     assert not caught.value.retry
+    assert "secret" not in str(caught.value)
 
 
 def test_a_kind_can_be_forced(tmp_path: Path) -> None:
@@ -59,6 +60,10 @@ def test_a_kind_can_be_forced(tmp_path: Path) -> None:
         ("rtsp://", {}, "no host"),
         ("rtsp://camera:port/", {}, "RTSP address"),
         ("rtsp://camera/?transport=pigeon", {}, "udp or tcp"),
+        ("rtsp://me:secret@camera/?transport=pigeon", {}, "^rtsp://camera/.*udp or tcp"),
+        ("rtsp://me:secret@camera/?timeout=-1", {}, "^rtsp://camera/.*timeout must be"),
+        ("rtsp://me:secret@camera/", {"size": "1x1"}, "^rtsp://camera/: unknown option"),
+        ("rtsp://me:secret@camera:port/", {}, "RTSP address"),
         ("rtsp://camera/?timeout=-1", {}, "timeout must be a positive number"),
         ("/dev/video0?colour=red", {}, "known: format, rate, size, timeout"),
         ("none.mp4", {"fast": "1"}, "unknown option 'fast'"),

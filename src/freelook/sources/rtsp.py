@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 from urllib.parse import parse_qsl, unquote, urlencode, urlsplit
 
+from ..addresses import without_password
 from ..clock import NS_PER_S, Clock
 from ..errors import SourceError
 from ..media.rtp_video import RtpVideo
@@ -35,16 +36,17 @@ def open(
     silence or of an answer. Connecting happens in `units`."""
     import aiortsp  # noqa: F401 - so that a missing library is told now
 
+    shown = without_password(argument)
     parts = urlsplit(argument)
     query = parse_qsl(parts.query, keep_blank_values=True)
     own = {**options, **{name: value for name, value in query if name in _OWN_OPTIONS}}
-    check_options(argument, own, _OWN_OPTIONS)
+    check_options(shown, own, _OWN_OPTIONS)
     transport = own.get("transport", "tcp" if parts.scheme == "rtsps" else "udp")
     if transport not in ("udp", "tcp"):
-        raise SourceError(f"{argument}: transport must be udp or tcp, not {transport!r}")
+        raise SourceError(f"{shown}: transport must be udp or tcp, not {transport!r}")
     rest = urlencode([(name, value) for name, value in query if name not in _OWN_OPTIONS])
     url = parts._replace(query=rest).geturl() if rest != parts.query else argument
-    return RtspSource(url, transport, number(argument, own, "timeout", 2.0), clock)
+    return RtspSource(url, transport, number(shown, own, "timeout", 2.0), clock)
 
 
 class RtspSource:
