@@ -48,12 +48,30 @@ def served(port: int, **options: Any) -> Iterator[RtspServer]:
 
 
 def feed_while(sink: Sink, condition: Callable[[], Any]) -> None:
-    pause, count = threading.Event(), 0
-    while condition():
+    assert fed_until(sink, lambda: not condition(), 4000), "still so after 80 s and more"
+
+
+def fed_until(sink: Sink, condition: Callable[[], Any], most: int) -> bool:
+    """Whether it came true within so many pictures."""
+    pause = threading.Event()
+    for count in range(most):
+        if condition():
+            return True
         sink.write(frame(count))
-        count += 1
         pause.wait(0.02)
-        assert count < 4000, "still so after 80 s and more"
+    return False
+
+
+@contextmanager
+def seeing(sink: Sink, picture: Path, *source: str) -> Iterator[subprocess.Popen[bytes]]:
+    """A viewer who has seen pictures. As people do he calls again if there are none: on a machine
+    with far too much to do GStreamer 1.22 leaves one in a hundred viewers by TCP without."""
+    for _ in range(3):
+        with ffmpeg(picture, *source, count=10**6) as viewer:
+            if fed_until(sink, picture.exists, 1500):
+                yield viewer
+                return
+    pytest.fail("no pictures, at three attempts")
 
 
 def stalling_viewer(port: int) -> socket.socket:
@@ -196,17 +214,17 @@ def test_a_viewer_that_is_killed(transport: str, tmp_path: Path) -> None:
     source = ("-rtsp_transport", transport, "-i", f"rtsp://127.0.0.1:{port}/view")
     with served(port) as sink:
         with (
-            ffmpeg(pictures[0], *source, count=10**6) as killed,
-            ffmpeg(pictures[1], *source, count=10**6),
+            seeing(sink, pictures[0], *source) as killed,
+            seeing(sink, pictures[1], *source),
         ):
-            feed_while(sink, lambda: not all(picture.exists() for picture in pictures))
             feed_while(sink, lambda: sink.clients != 2)
             killed.kill()
             feed_while(sink, lambda: sink.clients > 1)
             pictures[1].unlink()
             feed_while(sink, lambda: not pictures[1].exists())
-        with ffmpeg(pictures[0], *source) as next_one:
-            feed_until(sink, next_one)
+        pictures[0].unlink()
+        with seeing(sink, pictures[0], *source):
+            pass
 
 
 @needs_gstreamer
@@ -215,8 +233,10 @@ def test_a_viewer_that_is_stopped_for_a_while(tmp_path: Path, rng: np.random.Gen
     port, picture = free_port(), tmp_path / "view.png"
     luma = rng.integers(0, 255, SIZE[::-1], np.uint8)
     source = ("-rtsp_transport", "tcp", "-i", f"rtsp://127.0.0.1:{port}/view")
-    with served(port, bitrate=50_000_000) as sink, ffmpeg(picture, *source, count=10**6) as viewer:
-        feed_while(sink, lambda: not picture.exists())
+    with (
+        served(port, bitrate=50_000_000) as sink,
+        seeing(sink, picture, *source) as viewer,
+    ):
         viewer.send_signal(signal.SIGSTOP)
         pause, index = threading.Event(), 0
         while not sink.counters["unread"]:
