@@ -65,7 +65,7 @@ def fed_until(sink: Sink, condition: Callable[[], Any], most: int) -> bool:
 @contextmanager
 def seeing(sink: Sink, picture: Path, *source: str) -> Iterator[subprocess.Popen[bytes]]:
     """A viewer who has seen pictures. As people do he calls again if there are none: on a machine
-    with far too much to do GStreamer 1.22 leaves one in a hundred viewers by TCP without."""
+    with far too much to do GStreamer 1.22 leaves one viewer in a hundred without."""
     for _ in range(3):
         with ffmpeg(picture, *source, count=10**6) as viewer:
             if fed_until(sink, picture.exists, 1500):
